@@ -1,0 +1,246 @@
+//! `sheet`: the woven sheet used for rendering: a gap, a yarn lobe, diffuse transmission, reflection.
+//!
+//! Three parts are visible in real goniometer data of shade cloth: a straight-through peak, an anisotropic skirt and a
+//! diffuse floor. The peak is the gap ([`Sheet::gap`]), a delta kept apart; the rest is this model's value. Light that
+//! hits the yarn (the cover, 1 - gap) is shared between the four factors, so that
+//! gap + R + T ≤ 1 in every direction whenever t_d + k_t + r_d + k_r ≤ 1, and all terms are reciprocal:
+//! the diffuse terms carry cover(l)·cover(v)/mean cover, the lobes min(cover(l), cover(v)).
+
+use crate::model::{Linear, MAX_SHAPE, Model, Param, Shape, fold};
+use crate::real::Real;
+use crate::term::{albedo, fresnel, ggx, warp};
+use crate::vec3::Vec3;
+use crate::weave;
+use std::f64::consts::PI;
+
+/// See the module's page.
+pub struct Sheet;
+
+/// Places of the linear factors.
+pub mod linear {
+    /// Diffuse transmission.
+    pub const T_D: usize = 0;
+    /// Forward yarn lobe.
+    pub const K_T: usize = 1;
+    /// Diffuse reflection.
+    pub const R_D: usize = 2;
+    /// Reflection lobe.
+    pub const K_R: usize = 3;
+}
+
+/// Places of the shape parameters and derived constants.
+pub mod shape {
+    /// Diameter over pitch of the warp yarns.
+    pub const GAMMA_WARP: usize = 0;
+    /// Diameter over pitch of the weft yarns.
+    pub const GAMMA_WEFT: usize = 1;
+    /// Height over width of a yarn's section.
+    pub const SECTION: usize = 2;
+    /// Width of the forward lobe along the weft.
+    pub const ALPHA_X: usize = 3;
+    /// Width of the forward lobe along the warp.
+    pub const ALPHA_Y: usize = 4;
+    /// Width of the reflection lobe along the weft.
+    pub const RALPHA_X: usize = 5;
+    /// Width of the reflection lobe along the warp.
+    pub const RALPHA_Y: usize = 6;
+    /// Reflectance of the reflection lobe at normal incidence.
+    pub const F0: usize = 7;
+    /// Derived: 1 / mean cover.
+    pub const INV_MEAN_COVER: usize = 8;
+    /// Derived: the one width of the forward lobe that stands for both in the albedo, √(alpha_x alpha_y).
+    pub const ALPHA_MEAN: usize = 9;
+    /// Derived: 1 / (mean loss of the forward lobe).
+    pub const INV_MEAN_LOSS: usize = 10;
+}
+
+use shape::{
+    ALPHA_MEAN, ALPHA_X, ALPHA_Y, F0, GAMMA_WARP, GAMMA_WEFT, INV_MEAN_COVER, INV_MEAN_LOSS,
+    RALPHA_X, RALPHA_Y, SECTION,
+};
+
+/// Share of the forward lobe that masking takes from direction `w`; it is given back diffusely.
+#[inline(always)]
+fn loss<R: Real>(s: &Shape<R>, w: Vec3<R>) -> R {
+    albedo::ggx_loss(w.z.abs(), s[ALPHA_MEAN])
+}
+
+/// The chances of (diffuse transmission, forward lobe, diffuse reflection); the reflection lobe has the rest.
+#[inline(always)]
+fn chances<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>) -> [R; 3] {
+    let lost = loss(s, wo);
+    [
+        w[linear::T_D] + w[linear::K_T] * lost,
+        w[linear::K_T] * lost.one_minus(),
+        w[linear::R_D],
+    ]
+}
+
+impl Sheet {
+    /// The gap's share for a beam along `w`: passes straight on, uncoloured.
+    #[inline(always)]
+    pub fn gap<R: Real>(s: &Shape<R>, w: Vec3<R>) -> R {
+        weave::openness(s[GAMMA_WARP], s[GAMMA_WEFT], s[SECTION], w)
+    }
+    /// A shape that has `cover` (glTF's alpha) in every direction and no lobes.
+    pub fn constant_cover(cover: f64) -> Shape<f64> {
+        let mut s = [0.0; MAX_SHAPE];
+        s[GAMMA_WARP] = cover;
+        s[ALPHA_X..=RALPHA_Y].fill(0.5);
+        s[F0] = 0.04;
+        Self::derive(&mut s);
+        s
+    }
+    /// Sampling weights that sum to 1, from the luminances of RGB factors (Rec. 709); the reflection lobe counts with
+    /// the mean of Schlick's reflectance, f0 + (1 - f0)/21.
+    pub fn weights(k: &[[f64; 3]; 8], s: &Shape<f64>) -> Linear<f64> {
+        let mut lum = k.map(|c| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
+        lum[linear::K_R] *= s[F0] + (1.0 - s[F0]) / 21.0;
+        crate::model::normalized(&lum)
+    }
+}
+
+impl Model for Sheet {
+    const NAME: &'static str = "sheet";
+    const EQUATION: &'static str = "T: c_l c_v t_d/(π c̄) + min(c_l,c_v) k_t (M(l,v') + (1-E_l)(1-E_v)/(π(1-Ē))); \
+        R: c_l c_v r_d/(π c̄) + min(c_l,c_v) k_r M_r(l,v) F(f0); c = 1 - openness; gap: openness·δ";
+    const DOC: &'static str = "The woven sheet: openness of the weave as a delta apart, forward GGX lobe along the yarns with its masking \
+        loss given back, diffuse transmission, diffuse and glossy reflection. Energy-bounded and reciprocal by construction.";
+    const RECIPROCAL: bool = true;
+    const PARAMS: &'static [Param] = &[
+        Param::linear(
+            "t_d",
+            "share of the yarn's light transmitted evenly",
+            1.0,
+            0.2,
+        ),
+        Param::linear(
+            "k_t",
+            "share of the yarn's light in the forward lobe",
+            1.0,
+            0.2,
+        ),
+        Param::linear(
+            "r_d",
+            "share of the yarn's light reflected evenly",
+            1.0,
+            0.4,
+        ),
+        Param::linear("k_r", "strength of the reflection lobe", 1.0, 0.0),
+        Param::shape(
+            "gamma_warp",
+            "warp yarn diameter over pitch: 0.8 leaves a fifth open",
+            0.0,
+            1.0,
+            0.75,
+        ),
+        Param::shape(
+            "gamma_weft",
+            "weft yarn diameter over pitch",
+            0.0,
+            1.0,
+            0.75,
+        ),
+        Param::shape(
+            "section",
+            "height of a yarn over its width: 1 round, 0 flat",
+            0.0,
+            2.0,
+            0.5,
+        ),
+        Param::shape(
+            "alpha_x",
+            "width of the forward lobe along the weft",
+            0.02,
+            1.0,
+            0.2,
+        )
+        .log(),
+        Param::shape(
+            "alpha_y",
+            "width of the forward lobe along the warp",
+            0.02,
+            1.0,
+            0.2,
+        )
+        .log(),
+        Param::shape(
+            "ralpha_x",
+            "width of the reflection lobe along the weft",
+            0.02,
+            1.0,
+            0.4,
+        )
+        .log(),
+        Param::shape(
+            "ralpha_y",
+            "width of the reflection lobe along the warp",
+            0.02,
+            1.0,
+            0.4,
+        )
+        .log(),
+        Param::shape(
+            "f0",
+            "reflectance of the yarn's surface at normal incidence",
+            0.0,
+            1.0,
+            0.04,
+        ),
+    ];
+
+    fn derive<R: Real>(s: &mut Shape<R>) {
+        s[INV_MEAN_COVER] = weave::mean_cover(s[GAMMA_WARP], s[GAMMA_WEFT], s[SECTION])
+            .max(R::of(1e-6))
+            .recip();
+        s[ALPHA_MEAN] = (s[ALPHA_X] * s[ALPHA_Y]).max(R::of(1e-8)).sqrt();
+        s[INV_MEAN_LOSS] = albedo::ggx_mean_loss(s[ALPHA_MEAN])
+            .max(R::of(1e-6))
+            .recip();
+    }
+
+    #[inline(always)]
+    fn basis<R: Real>(s: &Shape<R>, l: Vec3<R>, v: Vec3<R>) -> Linear<R> {
+        let through = fold::transmits(l, v);
+        let cover_l = Self::gap(s, l).one_minus();
+        let cover_v = Self::gap(s, v).one_minus();
+        let diffuse = cover_l * cover_v * s[INV_MEAN_COVER] * R::of(1.0 / PI);
+        let ax = R::select(through, s[ALPHA_X], s[RALPHA_X]);
+        let ay = R::select(through, s[ALPHA_Y], s[RALPHA_Y]);
+        let (lu, vu) = (fold::up(l), fold::up(v));
+        let lobe = ggx::lobe(lu, vu, ax, ay);
+        let back = loss(s, l) * loss(s, v) * s[INV_MEAN_LOSS] * R::of(1.0 / PI);
+        let fresnel = fresnel::schlick(lu.dot((lu + vu).normalize()), s[F0]);
+        let cover = cover_l.min(cover_v);
+        let mut b = [R::zero(); 8];
+        b[linear::T_D] = R::select(through, diffuse, R::zero());
+        b[linear::K_T] = R::select(through, cover * (lobe + back), R::zero());
+        b[linear::R_D] = R::select(through, R::zero(), diffuse);
+        b[linear::K_R] = R::select(through, R::zero(), cover * lobe * fresnel);
+        b
+    }
+
+    #[inline(always)]
+    fn pdf<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>, wi: Vec3<R>) -> R {
+        let through = fold::transmits(wo, wi);
+        let [td, tl, rd] = chances(s, w, wo);
+        let ax = R::select(through, s[ALPHA_X], s[RALPHA_X]);
+        let ay = R::select(through, s[ALPHA_Y], s[RALPHA_Y]);
+        let lobe = ggx::pdf(fold::up(wi), fold::up(wo), ax, ay);
+        let cosine = wi.z.abs() * R::of(1.0 / PI);
+        R::select(through, td, rd) * cosine + R::select(through, tl, w[linear::K_R]) * lobe
+    }
+
+    #[inline(always)]
+    fn sample<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>, u: [R; 3]) -> Vec3<R> {
+        let [td, tl, rd] = chances(s, w, wo);
+        let diffuse = u[2].lt(td + rd);
+        let through = u[2].lt(td) | (u[2].lt(td + rd + tl) & !diffuse);
+        let ax = R::select(through, s[ALPHA_X], s[RALPHA_X]);
+        let ay = R::select(through, s[ALPHA_Y], s[RALPHA_Y]);
+        let lobe = ggx::sample(fold::up(wo), ax, ay, u[0], u[1]);
+        let wi = Vec3::select(diffuse, warp::cosine(u[0], u[1]), lobe);
+        let there = fold::opposite(wo, wi);
+        Vec3::select(through, there, Vec3::new(there.x, there.y, -there.z))
+    }
+}

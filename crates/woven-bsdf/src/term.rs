@@ -1,0 +1,8 @@
+//! The terms that models are built from: distributions, masking, Fresnel, phase functions, samplers.
+
+pub mod albedo;
+pub mod beckmann;
+pub mod fresnel;
+pub mod ggx;
+pub mod hg;
+pub mod warp;

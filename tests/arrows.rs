@@ -20,7 +20,7 @@ const NAMED_IN: &[(&str, &[&str])] = &[
     ("serialport", &["crates/ogm-driver/src/serial.rs"]),
     ("egui", &["apps/viewer"]),
     ("obvhs", &["crates/woven-render/src"]),
-    ("openh264", &["apps/catalog/src"]),
+    ("openh264", &["apps/catalog"]),
     ("roxmltree", &["crates/woven-bsdf/src/measured"]),
 ];
 

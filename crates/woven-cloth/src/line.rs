@@ -1,0 +1,208 @@
+//! The direct solve of one thread: all stretch constraints of a warp (or weft) line at once, a tridiagonal system.
+//!
+//! XPBD (Macklin et al. 2016) with compliance alpha = 1/k asks for (J M⁻¹ Jᵀ + alpha/h²) dlambda = -C. Along a thread
+//! J M⁻¹ Jᵀ is tridiagonal, so one forward and one backward sweep solve it exactly, where Gauss-Seidel would leave a stretch that
+//! grows with the count of rows. Eight threads are solved side by side, which the compiler turns into vector code.
+
+/// Threads solved side by side.
+pub(crate) const LANES: usize = 8;
+pub(crate) type Lane = [f64; LANES];
+
+/// Work space for eight threads of up to `n` vertices.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    /// Positions, changed in place by `solve`.
+    pub(crate) x: Vec<Lane>,
+    pub(crate) y: Vec<Lane>,
+    pub(crate) z: Vec<Lane>,
+    /// Inverse masses.
+    pub(crate) w: Vec<Lane>,
+    /// Displacement since the last step, used when there is damping.
+    pub(crate) d: [Vec<Lane>; 3],
+    nx: Vec<Lane>,
+    ny: Vec<Lane>,
+    nz: Vec<Lane>,
+    c: Vec<Lane>,
+    r: Vec<Lane>,
+}
+
+/// What the springs of the eight threads have in common.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Springs {
+    /// Rest length, m.
+    pub(crate) rest: f64,
+    /// alpha / h'² = 1/(k h'²) per lane, 1/kg.
+    pub(crate) alpha: Lane,
+    /// Damping time / h'; 0 for none.
+    pub(crate) damping: f64,
+    /// Growth of the tangent stiffness per strain, in tension.
+    pub(crate) stiffening: f64,
+}
+
+impl Block {
+    pub(crate) fn new(n: usize) -> Self {
+        let lane = || vec![[0.0; LANES]; n];
+        Self {
+            x: lane(),
+            y: lane(),
+            z: lane(),
+            w: lane(),
+            d: [lane(), lane(), lane()],
+            nx: lane(),
+            ny: lane(),
+            nz: lane(),
+            c: lane(),
+            r: lane(),
+        }
+    }
+
+    /// Fills the lanes from `lanes` on with a copy of the first, so that they hold ordinary numbers.
+    pub(crate) fn fill_spare(&mut self, j: usize, lanes: usize) {
+        for l in lanes..LANES {
+            self.x[j][l] = self.x[j][0];
+            self.y[j][l] = self.y[j][0];
+            self.z[j][l] = self.z[j][0];
+            self.w[j][l] = self.w[j][0];
+        }
+    }
+
+    /// One exact solve of the linearised constraints of a thread of `n` vertices.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "fixed-size loops over lanes become vector instructions"
+    )]
+    pub(crate) fn solve(&mut self, n: usize, springs: &Springs) {
+        let Springs {
+            rest,
+            alpha,
+            damping,
+            stiffening,
+        } = *springs;
+        let g = 1.0 + damping;
+        let inv_rest = 1.0 / rest;
+        let (x, y, z, w) = (
+            &mut self.x[..n],
+            &mut self.y[..n],
+            &mut self.z[..n],
+            &self.w[..n],
+        );
+        let (nx, ny, nz) = (&mut self.nx[..n], &mut self.ny[..n], &mut self.nz[..n]);
+        let (c, r) = (&mut self.c[..n], &mut self.r[..n]);
+        let [d0, d1, d2] = &self.d;
+        let (mut px, mut py, mut pz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (mut cp, mut rp) = ([0.0; LANES], [0.0; LANES]);
+        for j in 0..n - 1 {
+            let (mut ex, mut ey, mut ez) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            let (mut cc, mut rr) = ([0.0; LANES], [0.0; LANES]);
+            for l in 0..LANES {
+                let (ax, ay, az) = (
+                    x[j + 1][l] - x[j][l],
+                    y[j + 1][l] - y[j][l],
+                    z[j + 1][l] - z[j][l],
+                );
+                let len = (ax * ax + ay * ay + az * az).sqrt().max(1e-12);
+                let inv = 1.0 / len;
+                (ex[l], ey[l], ez[l]) = (ax * inv, ay * inv, az * inv);
+                let stretch = len - rest;
+                // A stiffening thread: the secant compliance at the present stretch.
+                let soft = alpha[l] / (1.0 + 0.5 * stiffening * (stretch * inv_rest).max(0.0));
+                // Coupling to the edge before through the vertex between: -w n·n'.
+                let b = -w[j][l] * (ex[l] * px[l] + ey[l] * py[l] + ez[l] * pz[l]) * g;
+                let a = (w[j][l] + w[j + 1][l]) * g + soft;
+                let m = 1.0 / (a - b * cp[l]).max(1e-300);
+                rr[l] = -stretch;
+                if damping > 0.0 {
+                    let v = ex[l] * (d0[j + 1][l] - d0[j][l])
+                        + ey[l] * (d1[j + 1][l] - d1[j][l])
+                        + ez[l] * (d2[j + 1][l] - d2[j][l]);
+                    rr[l] -= damping * v;
+                }
+                rr[l] = (rr[l] - b * rp[l]) * m;
+                // The next row's off-diagonal is symmetric but needs the next direction; keep m and finish there.
+                cc[l] = m;
+            }
+            (nx[j], ny[j], nz[j]) = (ex, ey, ez);
+            // cp for the next row: c_j m with c_j = -w_{j+1} n_j·n_{j+1} g, formed from the next direction below.
+            if j + 2 < n {
+                for l in 0..LANES {
+                    let (ax, ay, az) = (
+                        x[j + 2][l] - x[j + 1][l],
+                        y[j + 2][l] - y[j + 1][l],
+                        z[j + 2][l] - z[j + 1][l],
+                    );
+                    let inv = 1.0 / (ax * ax + ay * ay + az * az).sqrt().max(1e-12);
+                    cc[l] *= -w[j + 1][l] * (ax * ex[l] + ay * ey[l] + az * ez[l]) * inv * g;
+                }
+            }
+            (c[j], r[j]) = (cc, rr);
+            (px, py, pz, cp, rp) = (ex, ey, ez, cc, rr);
+        }
+        // Back substitution, moving the vertices on the way: vertex j+1 by w (lambda_j n_j - lambda_{j+1} n_{j+1}).
+        let (mut fx, mut fy, mut fz, mut lambda) =
+            ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for j in (0..n - 1).rev() {
+            for l in 0..LANES {
+                lambda[l] = if j + 2 < n {
+                    r[j][l] - c[j][l] * lambda[l]
+                } else {
+                    r[j][l]
+                };
+                let (gx, gy, gz) = (
+                    lambda[l] * nx[j][l],
+                    lambda[l] * ny[j][l],
+                    lambda[l] * nz[j][l],
+                );
+                x[j + 1][l] += w[j + 1][l] * (gx - fx[l]);
+                y[j + 1][l] += w[j + 1][l] * (gy - fy[l]);
+                z[j + 1][l] += w[j + 1][l] * (gz - fz[l]);
+                (fx[l], fy[l], fz[l]) = (gx, gy, gz);
+            }
+        }
+        for l in 0..LANES {
+            x[0][l] -= w[0][l] * fx[l];
+            y[0][l] -= w[0][l] * fy[l];
+            z[0][l] -= w[0][l] * fz[l];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hanging_chain_takes_its_exact_stretch_in_one_solve() {
+        // Vertices moved down by h² g (the free fall of one step) are pulled back to where every spring carries the weight below.
+        let (n, rest, mass, k, h, g) = (40, 0.05, 1e-3, 400.0, 1e-3, 9.81);
+        let mut block = Block::new(n);
+        let mut want = vec![0.0; n];
+        for j in 1..n {
+            let below = (n - j) as f64 * mass;
+            want[j] = want[j - 1] - rest - below * g / k;
+        }
+        for j in 0..n {
+            block.w[j] = [if j == 0 { 0.0 } else { 1.0 / mass }; LANES];
+            block.y[j] = [if j == 0 { 0.0 } else { want[j] - h * h * g }; LANES];
+        }
+        block.solve(
+            n,
+            &Springs {
+                rest,
+                alpha: [1.0 / (k * h * h); LANES],
+                damping: 0.0,
+                stiffening: 0.0,
+            },
+        );
+        for j in 0..n {
+            for l in 0..LANES {
+                assert!(
+                    (block.y[j][l] - want[j]).abs() < 1e-12,
+                    "row {j}: {} for {}",
+                    block.y[j][l],
+                    want[j]
+                );
+                assert!(block.x[j][l].abs() < 1e-15);
+            }
+        }
+    }
+}

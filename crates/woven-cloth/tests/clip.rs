@@ -1,0 +1,199 @@
+//! A clip from description to cache file and back: a valid glTF, point caches, resume after a stop.
+
+use std::ops::ControlFlow;
+use woven_cloth::{CurtainClip, CurtainSpec, Simulation, simulate, simulate_to};
+
+fn spec() -> CurtainSpec {
+    "width = 0.5\nheight = 0.7\npleats = 4\ncolumns = 33\nrows = 17\nframes = 10\nsettle = 0.5\nwarm_up = 0.1\n[wind]\nspeed = 1.5".parse().unwrap()
+}
+
+fn go(_: usize, _: usize) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+#[test]
+fn the_glb_is_valid_gltf_and_reads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("curtain.glb");
+    let clip = simulate(&spec(), &mut go).unwrap();
+    clip.write(&path).unwrap();
+    // The crate gltf validates indices, accessors, min and max.
+    let document = gltf::Gltf::open(&path).unwrap();
+    let blob = document.blob.as_deref().unwrap();
+    let mesh = document.meshes().next().unwrap();
+    let primitive = mesh.primitives().next().unwrap();
+    let reader = primitive.reader(|_| Some(blob));
+    assert_eq!(reader.read_positions().unwrap().count(), 33 * 17);
+    assert_eq!(primitive.morph_targets().count(), 10);
+    let mut worst = 0.0f32;
+    for (k, (moved, _, _)) in reader.read_morph_targets().enumerate() {
+        for ((d, base), want) in moved
+            .unwrap()
+            .zip(&clip.mesh.positions)
+            .zip(&clip.frames[k].positions)
+        {
+            for c in 0..3 {
+                worst = worst.max((d[c] + base[c] - want[c]).abs());
+            }
+        }
+    }
+    // Base and difference are rounded to f32 once each: a few 1e-7 m on metres.
+    assert!(worst < 1e-6, "{worst}");
+    let animation = document.animations().next().unwrap();
+    let channel = animation.channels().next().unwrap();
+    let channel = channel.reader(|_| Some(blob));
+    let times: Vec<f32> = channel.read_inputs().unwrap().collect();
+    assert!((times[9] - 9.0 / 24.0).abs() < 1e-6);
+
+    let back = CurtainClip::read(&path).unwrap();
+    assert_eq!(back.mesh, clip.mesh);
+    assert_eq!(back.frames.len(), 10);
+}
+
+#[test]
+fn pc2_reads_back_exactly_and_mdd_has_its_length() {
+    let folder = tempfile::tempdir().unwrap();
+    let clip = simulate(
+        &CurtainSpec {
+            frames: 3,
+            ..spec()
+        },
+        &mut go,
+    )
+    .unwrap();
+    let pc2 = folder.path().join("c.pc2");
+    clip.write(&pc2).unwrap();
+    let back = CurtainClip::read(&pc2).unwrap();
+    for (a, b) in back.frames.iter().zip(&clip.frames) {
+        assert_eq!(a.positions, b.positions);
+    }
+    let mdd = folder.path().join("c.mdd");
+    clip.write(&mdd).unwrap();
+    assert_eq!(
+        std::fs::metadata(&mdd).unwrap().len(),
+        8 + 3 * 4 + 3 * 33 * 17 * 12
+    );
+}
+
+#[test]
+fn a_stopped_clip_goes_on_and_ends_with_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, parts) = (
+        folder.path().join("whole.glb"),
+        folder.path().join("parts.glb"),
+    );
+    simulate_to(&spec(), &whole, 0, &mut go).unwrap();
+    let mut stops = 0;
+    loop {
+        match simulate_to(&spec(), &parts, 2, &mut |done, _| {
+            if done % 4 == 3 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        }) {
+            Ok(_) => break,
+            Err(e) => {
+                assert!(e.to_string().contains("stopped on request"), "{e}");
+                assert!(
+                    !parts.exists(),
+                    "nothing half done is left under the final name"
+                );
+                stops += 1;
+            }
+        }
+    }
+    assert_eq!(stops, 2);
+    assert_eq!(
+        std::fs::read(&whole).unwrap(),
+        std::fs::read(&parts).unwrap()
+    );
+    assert_eq!(
+        std::fs::read_dir(folder.path()).unwrap().count(),
+        2,
+        "helpers are removed"
+    );
+}
+
+#[test]
+fn too_many_frames_for_a_glb_are_refused_before_the_work() {
+    let many = CurtainSpec {
+        frames: 241,
+        ..spec()
+    };
+    let e = simulate_to(&many, std::path::Path::new("never.glb"), 0, &mut |_, _| {
+        panic!("must not start")
+    })
+    .unwrap_err()
+    .to_string();
+    assert!(e.contains("240") && e.contains(".pc2"), "{e}");
+    let e = simulate_to(&spec(), std::path::Path::new("never.abc"), 0, &mut go)
+        .unwrap_err()
+        .to_string();
+    assert!(e.contains("abc"), "{e}");
+}
+
+#[test]
+fn a_folder_that_is_not_there_is_a_sentence() {
+    let clip = simulate(
+        &CurtainSpec {
+            frames: 1,
+            ..spec()
+        },
+        &mut go,
+    )
+    .unwrap();
+    let e = clip
+        .write(std::path::Path::new("no/such/folder/c.glb"))
+        .unwrap_err()
+        .to_string();
+    assert!(e.contains("c.glb"), "{e}");
+}
+
+#[test]
+fn damaged_caches_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.glb");
+    simulate(
+        &CurtainSpec {
+            frames: 2,
+            ..spec()
+        },
+        &mut go,
+    )
+    .unwrap()
+    .write(&path)
+    .unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    for keep in [0, 10, 30, 2000, bytes.len() - 40_000] {
+        std::fs::write(&path, &bytes[..keep]).unwrap();
+        assert!(CurtainClip::read(&path).is_err(), "{keep} bytes");
+    }
+}
+
+/// The chain's own demand: 600 frames of wind without NaN, strain below 5 %, support = weight within 1 % at rest.
+#[test]
+fn six_hundred_frames_of_gusts_stay_whole() {
+    let text = "width = 0.7\nheight = 1.6\npleats = 6\ncolumns = 65\nrows = 49\nfps = 60.0\nwarm_up = 0.0\nsettle = 3.0\nfabric = \"voile\"\n[wind]\nspeed = 1.6\ngust = 0.5";
+    let mut sim = Simulation::new(&text.parse().unwrap()).unwrap();
+    let rest = sim.settle(3.0).unwrap();
+    let ratio = rest.support_force[1] / rest.weight;
+    assert!(
+        (ratio - 1.0).abs() < 0.01,
+        "the rail carries {ratio} of the weight"
+    );
+    let (mut strain, mut reach) = (0.0f64, 0.0f32);
+    for _ in 0..600 {
+        sim.step_frame().unwrap();
+        strain = strain.max(sim.report().max_strain);
+        let frame = sim.frame();
+        assert!(frame.positions.iter().flatten().all(|c| c.is_finite()));
+        reach = frame.positions.iter().fold(reach, |m, p| m.max(p[2]));
+    }
+    println!(
+        "rest: rail/weight {ratio:.5}; 600 frames: largest strain {:.2} %, reach {reach:.2} m",
+        strain * 100.0
+    );
+    assert!(strain < 0.05, "largest strain {strain}");
+    assert!(reach > 0.2, "the wind must move it: {reach} m");
+}

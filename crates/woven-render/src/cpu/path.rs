@@ -1,0 +1,314 @@
+//! One sample of one pixel. The pair of `shader/path.wgsl`.
+//!
+//! A camera ray goes straight on through every sheet it meets. At each crossing the light that the sheet scatters
+//! towards the eye is estimated with weight (product of the gaps before it); only the indirect part is taken at one
+//! crossing, chosen in proportion to what the crossings contribute. So the view through the cloth is as clean as
+//! without it, and there is no coin in the picture of the cloth itself.
+
+use glam::Vec3;
+
+use super::bvh::{FAINT, Ray, nearest, transmittance};
+use super::light::{self, Place};
+use super::math::luminance;
+use super::surface::{self, Surface};
+use crate::rng::Rng;
+use crate::scene::LAYERS;
+use crate::table::{MATT, MaterialRow, NONE, TRANSMITS, Table};
+
+/// Sheets at which a camera ray is lit; beyond it goes on dark (the product of as many gaps is below any noise).
+pub(crate) const CROSSINGS: u32 = 64;
+/// Sets of random numbers: 0 camera, 1.. crossings, from here two a bounce.
+pub(crate) const BOUNCES: u32 = CROSSINGS + 1;
+
+/// What is the same for all samples of a picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    pub eye: Vec3,
+    /// To the right edge of the picture, at distance 1.
+    pub right: Vec3,
+    /// To its upper edge.
+    pub up: Vec3,
+    pub forward: Vec3,
+    /// Unit vectors of the lens.
+    pub lens_x: Vec3,
+    pub lens_y: Vec3,
+    pub aperture: f32,
+    pub focus: f32,
+    pub width: u32,
+    pub height: u32,
+    /// Most scattering events of a path; gaps do not count.
+    pub depth: u32,
+    pub seed: u32,
+}
+
+/// One sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Sample {
+    /// Radiance by light layer.
+    pub light: [Vec3; LAYERS],
+    /// Reflectance and transmittance of what is seen, weighted like the picture.
+    pub albedo: Vec3,
+    /// Shading normal of what is seen first, towards the eye.
+    pub normal: Vec3,
+    /// Distance of what is seen first [m], 0 for nothing.
+    pub depth: f32,
+    /// Share of the picture that is seen through gaps.
+    pub gap: f32,
+}
+
+/// A point from which a path goes on.
+#[derive(Clone, Copy)]
+struct Vertex {
+    s: Surface,
+    at: Place,
+    wo: Vec3,
+    throughput: Vec3,
+}
+
+fn towards_eye(s: &Surface, d: Vec3) -> Vec3 {
+    if s.frame[2].dot(d) > 0.0 {
+        -s.frame[2]
+    } else {
+        s.frame[2]
+    }
+}
+
+fn place(table: &Table, m: &MaterialRow, s: &Surface, d: Vec3) -> Place {
+    light::place(table, s.p, towards_eye(s, d), m.flags & TRANSMITS != 0)
+}
+
+/// Power heuristic.
+#[inline(always)]
+fn heuristic(a: f32, b: f32) -> f32 {
+    let r = b / a.max(1e-30);
+    1.0 / (1.0 + r * r)
+}
+
+/// Scattering at this material shares all lights with the sampling of lights.
+fn shares(m: &MaterialRow) -> bool {
+    m.flags & MATT == 0
+}
+
+/// Light that reaches the place from a sampled light and is scattered towards `wo` (in the sheet's frame).
+fn direct(
+    table: &Table,
+    m: &MaterialRow,
+    s: &Surface,
+    at: &Place,
+    wo: Vec3,
+    u: [f32; 4],
+    rng: &mut Rng,
+) -> Option<(u32, Vec3)> {
+    let l = light::sample(table, at, [u[0], u[1], u[2]])?;
+    let wi = s.local(l.wi);
+    let mut value = surface::evaluate(m, s, wi, wo) * l.radiance * (wi.z.abs() / l.pdf);
+    if l.meets && (l.shared || shares(m)) {
+        value *= heuristic(l.pdf, surface::density(m, wo, wi));
+    }
+    if value.max_element() <= 0.0 {
+        return None;
+    }
+    let ray = Ray::new(s.leave(table, l.wi), l.wi);
+    let passed = transmittance(table, &ray, l.distance - (1e-4 + 1e-4 * l.distance), rng);
+    Some((l.layer, value * passed))
+}
+
+/// The camera ray of pixel (x, y).
+fn camera_ray(view: &View, x: u32, y: u32, u: [f32; 4]) -> Ray {
+    let sx = (x as f32 + u[0]) / view.width as f32 * 2.0 - 1.0;
+    let sy = 1.0 - (y as f32 + u[1]) / view.height as f32 * 2.0;
+    let d = view.forward + view.right * sx + view.up * sy;
+    if view.aperture <= 0.0 {
+        return Ray::new(view.eye, d.normalize());
+    }
+    let (sin, cos) = super::math::sincos_turn(u[2]);
+    let r = view.aperture * u[3].sqrt();
+    let lens = view.lens_x * (r * cos) + view.lens_y * (r * sin);
+    Ray::new(view.eye + lens, (d * view.focus - lens).normalize())
+}
+
+/// Sample `index` of pixel (x, y).
+pub(crate) fn sample(table: &Table, view: &View, x: u32, y: u32, index: u32) -> Sample {
+    let mut out = Sample::default();
+    let mut rng = Rng::new(x, y, index, view.seed);
+    let ray = camera_ray(view, x, y, rng.set(0));
+    let mut passed = 1.0_f32;
+    let mut tmin = 0.0;
+    let mut chosen: Option<Vertex> = None;
+    let mut chosen_weight = 0.0;
+    let mut all_weights = 0.0;
+    let mut pick = rng.coin();
+    for crossing in 0..CROSSINGS {
+        let Some(hit) = nearest(table, &ray, tmin, f32::INFINITY) else {
+            add(
+                &mut out.light,
+                table.globals.sky_layer,
+                light::sky(table, ray.d) * passed,
+            );
+            light::discs(table, ray.d, |layer, l| {
+                add(&mut out.light, layer, l * passed);
+            });
+            break;
+        };
+        let s = surface::surface(table, &hit);
+        let m = &table.materials[s.material as usize];
+        let wo = s.local(-ray.d);
+        let gap = surface::gap(m, &s, ray.d);
+        add(
+            &mut out.light,
+            m.layer,
+            surface::emission(table, m, &s, -ray.d) * (passed * (1.0 - gap)),
+        );
+        let albedo = m.emission[3] * luminance(s.tint);
+        if crossing == 0 {
+            out.normal = towards_eye(&s, ray.d);
+            out.depth = hit.t;
+        }
+        out.albedo += reflectance(m, &s) * (passed * (1.0 - gap));
+        let weight = passed * (1.0 - gap) * albedo;
+        if weight > 0.0 && view.depth > 0 {
+            let at = place(table, m, &s, ray.d);
+            let u = rng.set(1 + crossing);
+            if let Some((layer, value)) = direct(table, m, &s, &at, wo, u, &mut rng) {
+                add(&mut out.light, layer, value * passed);
+            }
+            // Reservoir of one: each crossing is kept in proportion to its weight.
+            all_weights += weight;
+            let keep = weight / all_weights;
+            if pick < keep {
+                pick /= keep;
+                chosen = Some(Vertex {
+                    s,
+                    at,
+                    wo,
+                    throughput: Vec3::splat(passed),
+                });
+                chosen_weight = weight;
+            } else {
+                pick = (pick - keep) / (1.0 - keep);
+            }
+        }
+        passed *= gap;
+        if passed <= 0.0 {
+            break;
+        }
+        out.gap = passed;
+        if passed < FAINT {
+            if rng.coin() < 0.5 {
+                out.gap = 0.0;
+                break;
+            }
+            passed *= 2.0;
+        }
+        tmin = hit.t * (1.0 + 2e-6) + table.globals.offset;
+    }
+    if let Some(mut v) = chosen {
+        v.throughput *= all_weights / chosen_weight;
+        follow(table, view, v, &mut rng, &mut out.light);
+    }
+    out
+}
+
+fn reflectance(m: &MaterialRow, s: &Surface) -> Vec3 {
+    m.linear
+        .iter()
+        .fold(Vec3::ZERO, |sum, k| sum + Vec3::new(k[0], k[1], k[2]))
+        * s.tint
+}
+
+#[inline(always)]
+fn add(light: &mut [Vec3; LAYERS], layer: u32, value: Vec3) {
+    light[(layer as usize).min(LAYERS - 1)] += value;
+}
+
+/// Follows the path that scatters at `v` until it ends.
+fn follow(table: &Table, view: &View, mut v: Vertex, rng: &mut Rng, light: &mut [Vec3; LAYERS]) {
+    for bounce in 1..=view.depth {
+        let m = &table.materials[v.s.material as usize];
+        let mixed = shares(m);
+        // The last ray could only meet lights that sampling has already counted.
+        if bounce == view.depth && !mixed && table.globals.soft_lights == 0 {
+            return;
+        }
+        let u = rng.set(BOUNCES + 2 * bounce);
+        let wi = surface::sample(m, v.wo, Vec3::new(u[0], u[1], u[2]));
+        let pdf = surface::density(m, v.wo, wi);
+        if pdf <= 1e-12 {
+            return;
+        }
+        v.throughput *= surface::evaluate(m, &v.s, wi, v.wo) * (wi.z.abs() / pdf);
+        // Russian roulette by what the path still carries.
+        let q = v.throughput.max_element();
+        if q <= 0.0 {
+            return;
+        }
+        if bounce > 1 && q < 1.0 {
+            if u[3] >= q {
+                return;
+            }
+            v.throughput *= 1.0 / q;
+        }
+        let d = v.s.world(wi);
+        let ray = Ray::new(v.s.leave(table, d), d);
+        let mut tmin = 0.0;
+        // Straight on through gaps, each by a coin.
+        let (hit, s) = loop {
+            let Some(hit) = nearest(table, &ray, tmin, f32::INFINITY) else {
+                let sky = table.globals.sky_light;
+                if sky != NONE {
+                    let met = light::density(table, &v.at, sky, d, 1e9);
+                    let share = if met <= 0.0 {
+                        1.0
+                    } else if mixed {
+                        heuristic(pdf, met)
+                    } else {
+                        0.0
+                    };
+                    add(
+                        light,
+                        table.globals.sky_layer,
+                        light::sky(table, d) * v.throughput * share,
+                    );
+                }
+                return;
+            };
+            let s = surface::surface(table, &hit);
+            let gap = surface::gap(&table.materials[s.material as usize], &s, d);
+            if gap <= 0.0 || (gap < 1.0 && rng.coin() >= gap) {
+                break (hit, s);
+            }
+            tmin = hit.t * (1.0 + 2e-6) + table.globals.offset;
+        };
+        let m = &table.materials[s.material as usize];
+        let emitted = surface::emission(table, m, &s, -d);
+        if emitted.max_element() > 0.0 {
+            let mut share = 1.0;
+            if s.light != NONE {
+                let met = light::density(table, &v.at, s.light, d, hit.t);
+                let both = mixed || light::soft(table, s.light);
+                if met > 0.0 {
+                    share = if both { heuristic(pdf, met) } else { 0.0 };
+                }
+            }
+            add(light, m.layer, emitted * v.throughput * share);
+        }
+        if bounce == view.depth || m.emission[3] <= 0.0 {
+            return;
+        }
+        let at = place(table, m, &s, d);
+        let wo = s.local(-d);
+        let u = rng.set(BOUNCES + 2 * bounce + 1);
+        // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
+        let gap = surface::gap(m, &s, d);
+        v.throughput *= 1.0 / (1.0 - gap).max(1e-6);
+        if let Some((layer, value)) = direct(table, m, &s, &at, wo, u, rng) {
+            add(light, layer, value * v.throughput);
+        }
+        v = Vertex {
+            s,
+            at,
+            wo,
+            throughput: v.throughput,
+        };
+    }
+}

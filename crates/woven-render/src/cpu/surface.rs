@@ -1,0 +1,307 @@
+//! The sheet at a point: frame, textures, gap, scattering. The pair of `shader/surface.wgsl`.
+
+use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
+
+use super::bvh::Hit;
+use super::math::sincos_turn;
+use crate::optics;
+use crate::table::{DOUBLE_SIDED, EMITS, EVEN, MATT, MaterialRow, NONE, Table, TextureRow};
+
+/// A point of a sheet, seen along a ray.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    /// The point.
+    pub p: Vec3,
+    /// Unit normal of the triangle.
+    pub ng: Vec3,
+    /// Weft, warp and shading normal.
+    pub frame: [Vec3; 3],
+    /// Texture coordinates.
+    pub uv: [f32; 2],
+    /// Row of the material.
+    pub material: u32,
+    /// Row of the light or `NONE`.
+    pub light: u32,
+    /// Colour texture: multiplies the linear factors.
+    pub tint: Vec3,
+    /// Coverage texture.
+    pub alpha: f32,
+}
+
+impl Surface {
+    #[inline(always)]
+    pub(crate) fn local(&self, w: Vec3) -> Vec3 {
+        Vec3::new(
+            w.dot(self.frame[0]),
+            w.dot(self.frame[1]),
+            w.dot(self.frame[2]),
+        )
+    }
+
+    #[inline(always)]
+    pub(crate) fn world(&self, w: Vec3) -> Vec3 {
+        self.frame[0] * w.x + self.frame[1] * w.y + self.frame[2] * w.z
+    }
+
+    /// Where a ray towards `d` starts: off the surface, on the side it leaves to.
+    #[inline(always)]
+    pub(crate) fn leave(&self, table: &Table, d: Vec3) -> Vec3 {
+        let away = if self.ng.dot(d) < 0.0 {
+            -table.globals.offset
+        } else {
+            table.globals.offset
+        };
+        self.p + self.ng * away
+    }
+}
+
+/// Shading normal at barycentric (u, v), turned to the side of the triangle's normal.
+#[inline(always)]
+fn frame(table: &Table, place: usize, u: f32, v: f32, ng: Vec3) -> [Vec3; 3] {
+    let s = &table.shade[place];
+    let n = |r: &[f32; 4]| Vec3::new(r[0], r[1], r[2]);
+    let sum = n(&s.n0) * (1.0 - u - v) + n(&s.n1) * u + n(&s.n2) * v;
+    let length = sum.length();
+    let z = if length > 1e-6 {
+        sum * (1.0 / length)
+    } else {
+        ng
+    };
+    let weft = n(&s.weft);
+    let along = weft - z * weft.dot(z);
+    let length = along.length();
+    let x = if length > 1e-4 {
+        along * (1.0 / length)
+    } else {
+        any_tangent(z)
+    };
+    [x, z.cross(x), z]
+}
+
+#[inline(always)]
+fn any_tangent(z: Vec3) -> Vec3 {
+    let a = if z.x.abs() < 0.7 { Vec3::X } else { Vec3::Y };
+    a.cross(z).normalize()
+}
+
+/// Texture coordinates at barycentric (u, v).
+#[inline(always)]
+fn uv_at(table: &Table, place: usize, u: f32, v: f32) -> [f32; 2] {
+    let s = &table.shade[place];
+    let w = 1.0 - u - v;
+    [
+        w * s.n0[3] + u * s.n1[3] + v * s.n2[3],
+        w * s.v[0] + u * s.v[1] + v * s.v[2],
+    ]
+}
+
+/// Everything about the hit that scattering needs.
+pub(crate) fn surface(table: &Table, hit: &Hit) -> Surface {
+    let place = hit.place as usize;
+    let packet = &table.bvh.packets[place / 4];
+    let lane = place % 4;
+    let at = |v: &[glam::Vec4; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
+    let (v0, e1, e2) = (at(&packet.v0), at(&packet.e1), at(&packet.e2));
+    let ng = e1.cross(e2).normalize();
+    let s = &table.shade[place];
+    let material = &table.materials[s.material as usize];
+    let mut tint = Vec3::ONE;
+    let mut alpha = 1.0;
+    let mut uv = [0.0; 2];
+    if material.color_texture != NONE
+        || material.coverage_texture != NONE
+        || material.emission_texture != NONE
+    {
+        uv = uv_at(table, place, hit.u, hit.v);
+        if material.color_texture != NONE {
+            let c = texel(table, material.color_texture, uv);
+            tint = Vec3::new(c[0], c[1], c[2]);
+        }
+        alpha = coverage(table, material, uv);
+    }
+    Surface {
+        p: v0 + e1 * hit.u + e2 * hit.v,
+        ng,
+        frame: frame(table, place, hit.u, hit.v, ng),
+        uv,
+        material: s.material,
+        light: s.light,
+        tint,
+        alpha,
+    }
+}
+
+/// Share of the light along `d` that passes straight through the sheet.
+#[inline(always)]
+pub(crate) fn gap(material: &MaterialRow, s: &Surface, d: Vec3) -> f32 {
+    if material.gap >= 0.0 {
+        return material.gap;
+    }
+    let open = optics::openness(&material.shape, s.local(d));
+    (1.0 - s.alpha * (1.0 - open)).clamp(0.0, 1.0)
+}
+
+/// The same for a triangle that a shadow ray along `d` meets at barycentric (u, v).
+pub(crate) fn gap_at(table: &Table, place: u32, u: f32, v: f32, d: Vec3) -> f32 {
+    let place = place as usize;
+    let material = &table.materials[table.shade[place].material as usize];
+    let mut alpha = 1.0;
+    if material.coverage_texture != NONE {
+        alpha = coverage(table, material, uv_at(table, place, u, v));
+        if alpha <= 0.0 {
+            return 1.0;
+        }
+    }
+    let mut local = Vec3::Z;
+    if material.flags & EVEN == 0 {
+        let packet = &table.bvh.packets[place / 4];
+        let lane = place % 4;
+        let at = |v: &[glam::Vec4; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
+        let ng = at(&packet.e1).cross(at(&packet.e2)).normalize();
+        let [x, y, z] = frame(table, place, u, v, ng);
+        local = Vec3::new(d.dot(x), d.dot(y), d.dot(z));
+    }
+    let open = optics::openness(&material.shape, local);
+    (1.0 - alpha * (1.0 - open)).clamp(0.0, 1.0)
+}
+
+/// Coverage by the texture's alpha.
+fn coverage(table: &Table, material: &MaterialRow, uv: [f32; 2]) -> f32 {
+    if material.coverage_texture == NONE {
+        return 1.0;
+    }
+    let alpha = texel(table, material.coverage_texture, uv)[3];
+    if material.alpha_cutoff < 0.0 {
+        alpha
+    } else if alpha < material.alpha_cutoff {
+        0.0
+    } else {
+        1.0
+    }
+}
+
+/// Linear RGBA of a texture at the mesh's coordinates, bilinear.
+fn texel(table: &Table, row: u32, uv: [f32; 2]) -> [f32; 4] {
+    let t = &table.textures[row as usize];
+    let x = (t.map_u[0] * uv[0] + t.map_u[1] * uv[1] + t.map_u[2]) * t.width as f32 - 0.5;
+    let y = (t.map_v[0] * uv[0] + t.map_v[1] * uv[1] + t.map_v[2]) * t.height as f32 - 0.5;
+    let (x0, y0) = (x.floor(), y.floor());
+    let (fx, fy) = (x - x0, y - y0);
+    let at = |dx: i32, dy: i32| {
+        let i = wrapped(x0 as i32 + dx, t.width as i32, t.flags & 3);
+        let j = wrapped(y0 as i32 + dy, t.height as i32, (t.flags >> 2) & 3);
+        decode(
+            table.texels[(t.first as i32 + j * t.width as i32 + i) as usize],
+            t,
+        )
+    };
+    let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
+    std::array::from_fn(|k| {
+        let top = a[k] + (b[k] - a[k]) * fx;
+        let low = c[k] + (d[k] - c[k]) * fx;
+        top + (low - top) * fy
+    })
+}
+
+fn wrapped(i: i32, n: i32, mode: u32) -> i32 {
+    match mode {
+        0 => ((i % n) + n) % n,
+        1 => {
+            let m = ((i % (2 * n)) + 2 * n) % (2 * n);
+            if m < n { m } else { 2 * n - 1 - m }
+        }
+        _ => i.clamp(0, n - 1),
+    }
+}
+
+fn decode(texel: u32, t: &TextureRow) -> [f32; 4] {
+    let c: [f32; 4] = std::array::from_fn(|k| ((texel >> (8 * k)) & 255) as f32 * (1.0 / 255.0));
+    if t.flags & 16 == 0 {
+        return c;
+    }
+    // sRGB, IEC 61966-2-1.
+    let linear = |x: f32| {
+        if x <= 0.04045 {
+            x * (1.0 / 12.92)
+        } else {
+            ((x + 0.055) * (1.0 / 1.055)).powf(2.4)
+        }
+    };
+    [linear(c[0]), linear(c[1]), linear(c[2]), c[3]]
+}
+
+/// Radiance that the surface gives off towards `wo`.
+pub(crate) fn emission(table: &Table, material: &MaterialRow, s: &Surface, wo: Vec3) -> Vec3 {
+    if material.flags & EMITS == 0 || (material.flags & DOUBLE_SIDED == 0 && s.ng.dot(wo) <= 0.0) {
+        return Vec3::ZERO;
+    }
+    let e = Vec3::new(
+        material.emission[0],
+        material.emission[1],
+        material.emission[2],
+    );
+    if material.emission_texture == NONE {
+        return e;
+    }
+    let c = texel(table, material.emission_texture, s.uv);
+    e * Vec3::new(c[0], c[1], c[2])
+}
+
+/// The same for a light that was sampled at barycentric (u, v) of a triangle.
+pub(crate) fn emission_at(table: &Table, place: u32, u: f32, v: f32) -> Vec3 {
+    let material = &table.materials[table.shade[place as usize].material as usize];
+    let e = Vec3::new(
+        material.emission[0],
+        material.emission[1],
+        material.emission[2],
+    );
+    if material.emission_texture == NONE {
+        return e;
+    }
+    let c = texel(
+        table,
+        material.emission_texture,
+        uv_at(table, place as usize, u, v),
+    );
+    e * Vec3::new(c[0], c[1], c[2])
+}
+
+/// f(wi, wo), both in the sheet's frame.
+#[inline(always)]
+pub(crate) fn evaluate(m: &MaterialRow, s: &Surface, wi: Vec3, wo: Vec3) -> Vec3 {
+    let k = |j: usize| Vec3::new(m.linear[j][0], m.linear[j][1], m.linear[j][2]);
+    let scale = s.tint * s.alpha;
+    if m.flags & (MATT | EVEN) == MATT | EVEN {
+        let j = if wi.z * wo.z < 0.0 { 0 } else { 2 };
+        return k(j) * scale * (m.cover * FRAC_1_PI);
+    }
+    let b = optics::sheet_basis(&m.shape, wi, wo);
+    (k(0) * b[0] + k(1) * b[1] + k(2) * b[2] + k(3) * b[3]) * scale
+}
+
+/// Density of [`sample`].
+#[inline(always)]
+pub(crate) fn density(m: &MaterialRow, wo: Vec3, wi: Vec3) -> f32 {
+    if m.flags & MATT != 0 {
+        return m.weights[if wi.z * wo.z < 0.0 { 0 } else { 2 }] * wi.z.abs() * FRAC_1_PI;
+    }
+    optics::sheet_pdf(&m.shape, &m.weights, wo, wi)
+}
+
+/// A direction to go on in, in the sheet's frame.
+#[inline(always)]
+pub(crate) fn sample(m: &MaterialRow, wo: Vec3, u: Vec3) -> Vec3 {
+    if m.flags & MATT != 0 {
+        let r = u.x.sqrt();
+        let (sin, cos) = sincos_turn(u.y);
+        let z = (1.0 - u.x).max(0.0).sqrt();
+        let through = u.z < m.weights[0];
+        return Vec3::new(
+            r * cos,
+            r * sin,
+            if (wo.z > 0.0) == through { -z } else { z },
+        );
+    }
+    optics::sheet_sample(&m.shape, &m.weights, wo, u)
+}

@@ -1,0 +1,397 @@
+//! The way in: settings, backends, and a renderer that gathers samples until it is told to stop.
+
+use anyhow::{Context, Result, ensure};
+use glam::Vec3;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::accumulate::Accumulation;
+use crate::cpu;
+use crate::cpu::path::View;
+use crate::film::Film;
+use crate::scene::{Camera, Scene};
+use crate::table::Table;
+
+/// What is counted as light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Integrator {
+    /// Everything up to [`Settings::depth`] scattering events.
+    #[default]
+    Path,
+    /// What lights give off and one scattering event.
+    Direct,
+}
+
+/// Where the work is done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backend {
+    /// On a GPU if there is one in hardware, else on the CPU.
+    #[default]
+    Auto,
+    /// The reference.
+    Cpu,
+    /// On a GPU, a software one (lavapipe) if there is no other; an error without any.
+    Gpu,
+}
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Samples a pixel.
+    pub spp: u32,
+    /// Most scattering events of a path; passing a gap is none.
+    pub depth: u32,
+    /// Another seed gives another noise.
+    pub seed: u32,
+    /// What is counted as light.
+    pub integrator: Integrator,
+    /// Keep the light of each layer apart.
+    pub light_layers: bool,
+    /// Add albedo, normal, depth, gap and variance.
+    pub aov: bool,
+    /// Stop after this time with the samples gathered by then (at least one a pixel).
+    pub time_limit: Option<Duration>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            width: 640,
+            height: 480,
+            spp: 64,
+            depth: 8,
+            seed: 0,
+            integrator: Integrator::Path,
+            light_layers: false,
+            aov: false,
+            time_limit: None,
+        }
+    }
+}
+
+/// Hears how far a render is and may stop it.
+pub trait Progress {
+    /// `done` of `total` pixel samples are gathered.
+    fn advance(&mut self, done: u64, total: u64);
+    /// A flag that ends the render early when set; the film then holds what was gathered.
+    fn stop(&self) -> Option<Arc<AtomicBool>> {
+        None
+    }
+}
+
+/// Nobody listens.
+impl Progress for () {
+    fn advance(&mut self, _done: u64, _total: u64) {}
+}
+
+/// Renders `scene` to the end.
+///
+/// # Errors
+/// A sentence when the scene or the settings cannot be rendered, when no GPU is there and one is asked for, or when
+/// it was stopped before the first sample.
+pub fn render(
+    scene: &Scene,
+    settings: &Settings,
+    backend: Backend,
+    progress: &mut dyn Progress,
+) -> Result<Film> {
+    let mut renderer = Renderer::new(scene, settings, backend)?;
+    renderer.finish(progress)?;
+    renderer.film()
+}
+
+/// A render that goes on step by step.
+pub struct Renderer {
+    table: Table,
+    settings: Settings,
+    /// Complete for the CPU; for the GPU the state of the last read-back.
+    sums: Accumulation,
+    engine: Engine,
+    note: Option<String>,
+}
+
+enum Engine {
+    Cpu,
+    Gpu(Box<crate::gpu::Gpu>),
+}
+
+impl Renderer {
+    /// Prepares the scene.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn new(scene: &Scene, settings: &Settings, backend: Backend) -> Result<Self> {
+        let (w, h) = (settings.width, settings.height);
+        ensure!(
+            w > 0 && h > 0,
+            "a picture of {w} x {h} pixels has no pixel; give a size like 640x480"
+        );
+        ensure!(
+            w <= 32_768 && h <= 32_768,
+            "{w} x {h} pixels are more than 32768 on a side"
+        );
+        ensure!(
+            settings.spp > 0,
+            "0 samples a pixel give no picture; ask for at least 1"
+        );
+        let table = Table::new(scene, settings.light_layers)?;
+        let sums = Accumulation::new(w, h);
+        let mut note = None;
+        let engine = match backend {
+            Backend::Cpu => Engine::Cpu,
+            Backend::Gpu => Engine::Gpu(Box::new(
+                crate::gpu::Gpu::new(&table, &view(&table, settings), true)
+                    .context("the GPU cannot be used")?,
+            )),
+            Backend::Auto => match crate::gpu::Gpu::new(&table, &view(&table, settings), false) {
+                Ok(gpu) => Engine::Gpu(Box::new(gpu)),
+                Err(why) => {
+                    note = Some(format!("rendering on the CPU: {why:#}"));
+                    Engine::Cpu
+                }
+            },
+        };
+        Ok(Self {
+            table,
+            settings: *settings,
+            sums,
+            engine,
+            note,
+        })
+    }
+
+    /// Where the work is done, in words.
+    #[must_use]
+    pub fn device(&self) -> String {
+        match &self.engine {
+            Engine::Cpu => format!("CPU ({} threads)", rayon::current_num_threads()),
+            Engine::Gpu(gpu) => gpu.name().to_owned(),
+        }
+    }
+
+    /// Something the user should be told once, such as why the CPU is used.
+    #[must_use]
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Samples a pixel gathered so far.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        match &self.engine {
+            Engine::Cpu => self.sums.samples,
+            Engine::Gpu(gpu) => gpu.samples(),
+        }
+    }
+
+    /// Gathers `count` more samples of every pixel. Returns false when `stop` was set meanwhile; the samples of this
+    /// step are then not counted.
+    ///
+    /// # Errors
+    /// When the GPU fails and the CPU cannot go on in its place.
+    pub fn step(&mut self, count: u32, stop: &AtomicBool) -> Result<bool> {
+        let view = view(&self.table, &self.settings);
+        if let Engine::Gpu(gpu) = &mut self.engine {
+            match gpu.step(&view, count, stop) {
+                Ok(done) => return Ok(done),
+                Err(why) => {
+                    // What was gathered since the last read-back is gathered again, on a fresh device or the CPU.
+                    let goal = gpu.samples() + count;
+                    self.recover(&why, goal, stop)?;
+                    return Ok(self.samples() >= goal);
+                }
+            }
+        }
+        Ok(cpu::step(&self.table, &view, &mut self.sums, count, stop))
+    }
+
+    fn recover(&mut self, why: &anyhow::Error, goal: u32, stop: &AtomicBool) -> Result<()> {
+        let view = view(&self.table, &self.settings);
+        let again = crate::gpu::Gpu::new(&self.table, &view, true).and_then(|mut gpu| {
+            gpu.restore(&self.sums)?;
+            gpu.step(&view, goal - self.sums.samples, stop)?;
+            Ok(gpu)
+        });
+        match again {
+            Ok(gpu) => {
+                self.note = Some(format!(
+                    "the GPU was lost and has been set up again: {why:#}"
+                ));
+                self.engine = Engine::Gpu(Box::new(gpu));
+            }
+            Err(_) => {
+                self.note = Some(format!("the GPU failed, going on with the CPU: {why:#}"));
+                self.engine = Engine::Cpu;
+                let missing = goal - self.sums.samples;
+                cpu::step(&self.table, &view, &mut self.sums, missing, stop);
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on until all samples are gathered, the time is over, or the listener stops it.
+    ///
+    /// # Errors
+    /// As [`Self::step`], and when there is not a single sample.
+    pub fn finish(&mut self, progress: &mut dyn Progress) -> Result<()> {
+        let stop = progress.stop().unwrap_or_default();
+        let start = Instant::now();
+        let pixels = u64::from(self.settings.width) * u64::from(self.settings.height);
+        let total = pixels * u64::from(self.settings.spp);
+        let mut count = 1;
+        while self.samples() < self.settings.spp {
+            let left = self.settings.spp - self.samples();
+            let began = Instant::now();
+            if !self.step(count.min(left), &stop)? {
+                break;
+            }
+            progress.advance(pixels * u64::from(self.samples()), total);
+            let took = began.elapsed().as_secs_f64();
+            // Steps of about a third of a second: often enough to stop and to report, seldom enough to cost nothing.
+            count =
+                ((f64::from(count) * 0.33 / took.max(1e-4)) as u32).clamp(1, (count * 2).max(1));
+            if let Some(limit) = self.settings.time_limit {
+                let rest = limit.saturating_sub(start.elapsed()).as_secs_f64();
+                if rest <= 0.0 {
+                    break;
+                }
+                let rate = f64::from(self.samples()) / start.elapsed().as_secs_f64().max(1e-6);
+                count = count.min((rest * rate) as u32).max(1);
+            }
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
+        }
+        ensure!(
+            self.samples() > 0,
+            "stopped before the first sample of each pixel; nothing was rendered"
+        );
+        Ok(())
+    }
+
+    /// The picture so far.
+    ///
+    /// # Errors
+    /// When it cannot be read back from the GPU.
+    pub fn film(&mut self) -> Result<Film> {
+        self.read_back()?;
+        let mut film = self.sums.film(&self.settings);
+        film.metadata.insert("device".into(), self.device());
+        Ok(film)
+    }
+
+    /// The sums so far, to be stored and resumed from.
+    ///
+    /// # Errors
+    /// As [`Self::film`].
+    pub fn sums(&mut self) -> Result<&Accumulation> {
+        self.read_back()?;
+        Ok(&self.sums)
+    }
+
+    fn read_back(&mut self) -> Result<()> {
+        if let Engine::Gpu(gpu) = &mut self.engine {
+            gpu.read(&mut self.sums)?;
+        }
+        Ok(())
+    }
+
+    /// Goes on from sums of an earlier run with the same scene and settings.
+    ///
+    /// # Errors
+    /// When the sizes differ.
+    pub fn resume(&mut self, sums: Accumulation) -> Result<()> {
+        ensure!(
+            (sums.width, sums.height) == (self.settings.width, self.settings.height),
+            "the checkpoint has {} x {} pixels, the picture {} x {}",
+            sums.width,
+            sums.height,
+            self.settings.width,
+            self.settings.height
+        );
+        self.sums = sums;
+        if let Engine::Gpu(gpu) = &mut self.engine {
+            gpu.restore(&self.sums)?;
+        }
+        Ok(())
+    }
+
+    /// Forgets all samples.
+    ///
+    /// # Errors
+    /// When the GPU does not answer.
+    pub fn clear(&mut self) -> Result<()> {
+        self.resume(Accumulation::new(self.settings.width, self.settings.height))
+    }
+
+    /// Another seed for the samples to come, as for the next frame of an animation; forgets the samples.
+    ///
+    /// # Errors
+    /// As [`Self::clear`].
+    pub fn set_seed(&mut self, seed: u32) -> Result<()> {
+        self.settings.seed = seed;
+        self.clear()
+    }
+
+    /// Looks from elsewhere; forgets the samples.
+    ///
+    /// # Errors
+    /// As [`Self::clear`].
+    pub fn set_camera(&mut self, camera: Camera) -> Result<()> {
+        self.table.camera = camera;
+        self.clear()
+    }
+
+    /// Moves the vertices of a mesh (refits the ray structure); forgets the samples. `normals` may be empty.
+    ///
+    /// # Errors
+    /// When the mesh is not there or has another number of vertices.
+    pub fn move_mesh(&mut self, mesh: usize, positions: &[Vec3], normals: &[Vec3]) -> Result<()> {
+        self.table.move_mesh(mesh, positions, normals)?;
+        if let Engine::Gpu(gpu) = &mut self.engine {
+            gpu.moved(&self.table)?;
+        }
+        self.clear()
+    }
+}
+
+/// The camera and the settings as the transport needs them.
+pub(crate) fn view(table: &Table, settings: &Settings) -> View {
+    let camera = &table.camera;
+    let m = camera.transform;
+    let unit = |v: glam::Vec4, or: Vec3| v.truncate().try_normalize().unwrap_or(or);
+    let (x, y, z) = (
+        unit(m.x_axis, Vec3::X),
+        unit(m.y_axis, Vec3::Y),
+        unit(m.z_axis, Vec3::Z),
+    );
+    let tan = (0.5 * camera.vfov).tan();
+    View {
+        eye: m.w_axis.truncate(),
+        right: x * (tan * settings.width as f32 / settings.height as f32),
+        up: y * tan,
+        forward: -z,
+        lens_x: x,
+        lens_y: y,
+        aperture: camera.aperture_radius,
+        focus: camera.focus_distance,
+        width: settings.width,
+        height: settings.height,
+        depth: match settings.integrator {
+            Integrator::Path => settings.depth,
+            Integrator::Direct => settings.depth.min(1),
+        },
+        seed: settings.seed,
+    }
+}

@@ -1,0 +1,237 @@
+//! The lights' rows: emissive meshes as rectangles and triangles, sun, points, the environment, then the windows.
+
+use crate::bvh::EMPTY;
+use crate::cpu::math::luminance;
+use crate::scene::{LAYERS, Light, Portal, Scene};
+use glam::Vec3;
+
+use super::{
+    DOUBLE_SIDED, EMITS, LightRow, NONE, POINT, PORTAL, RECT, SKY, SPOT, SUN, TRIANGLE, Table,
+};
+
+/// Fills `table.lights`, the light of each triangle, and the globals' counts.
+pub(super) fn fill(table: &mut Table, scene: &Scene, light_layers: bool) {
+    let layer = |l: u32| {
+        if light_layers {
+            l.min(LAYERS as u32 - 1)
+        } else {
+            0
+        }
+    };
+    let mut rows = emitters(table);
+    for light in &scene.lights {
+        rows.push(match *light {
+            Light::Sun {
+                direction,
+                irradiance,
+                angular_radius,
+                layer: l,
+            } => LightRow {
+                kind: SUN,
+                n: direction.try_normalize().unwrap_or(Vec3::Y).into(),
+                u: [
+                    angular_radius.clamp(0.0, 1.5).cos(),
+                    angular_radius.clamp(0.0, 1.5).sin(),
+                    0.0,
+                ],
+                radiance: irradiance,
+                layer: layer(l),
+                place: NONE,
+                ..LightRow::default()
+            },
+            Light::Point {
+                position,
+                intensity,
+                layer: l,
+            } => LightRow {
+                kind: POINT,
+                p: position.into(),
+                radiance: intensity,
+                layer: layer(l),
+                place: NONE,
+                ..LightRow::default()
+            },
+            Light::Spot {
+                position,
+                direction,
+                intensity,
+                inner_angle,
+                outer_angle,
+                layer: l,
+            } => LightRow {
+                kind: SPOT,
+                p: position.into(),
+                n: direction.try_normalize().unwrap_or(Vec3::NEG_Y).into(),
+                v: [
+                    inner_angle.cos().max(outer_angle.cos() + 1e-4),
+                    outer_angle.cos(),
+                    0.0,
+                ],
+                radiance: intensity,
+                layer: layer(l),
+                place: NONE,
+                ..LightRow::default()
+            },
+        });
+    }
+    if table.globals.sky_width > 0 {
+        table.globals.sky_light = rows.len() as u32;
+        rows.push(LightRow {
+            kind: SKY,
+            layer: table.globals.sky_layer,
+            place: NONE,
+            ..LightRow::default()
+        });
+    }
+    table.globals.lights = rows.len() as u32;
+    table.globals.soft_lights = u32::from(
+        rows.iter()
+            .any(|r| r.kind == TRIANGLE || (r.kind == RECT && r.area < 0.0)),
+    );
+    accumulate(table, &mut rows);
+    rows.extend(scene.portals.iter().map(portal));
+    table.globals.portals = scene.portals.len() as u32;
+    table.lights = rows;
+}
+
+/// Renews what depends on places after a mesh has moved.
+pub(super) fn moved(table: &mut Table) {
+    let lit = |row: &LightRow| row.kind != RECT && row.kind != TRIANGLE;
+    let fixed: Vec<LightRow> = table.lights.iter().copied().filter(lit).collect();
+    let (windows, others): (Vec<_>, Vec<_>) = fixed.into_iter().partition(|r| r.kind == PORTAL);
+    let mut rows = emitters(table);
+    rows.extend(others);
+    table.globals.lights = rows.len() as u32;
+    if let Some(sky) = rows.iter().position(|r| r.kind == SKY) {
+        table.globals.sky_light = sky as u32;
+    }
+    table.globals.soft_lights = u32::from(
+        rows.iter()
+            .any(|r| r.kind == TRIANGLE || (r.kind == RECT && r.area < 0.0)),
+    );
+    accumulate(table, &mut rows);
+    rows.extend(windows);
+    table.lights = rows;
+}
+
+/// Rows for the triangles that emit; two that form a parallelogram become one rectangle.
+fn emitters(table: &mut Table) -> Vec<LightRow> {
+    let mut glowing: Vec<(u32, u32, usize)> = Vec::new();
+    for (place, &i) in table.bvh.order.iter().enumerate() {
+        if i != EMPTY && table.materials[table.shade[place].material as usize].flags & EMITS != 0 {
+            glowing.push((table.shade[place].mesh, table.shade[place].triangle, place));
+        }
+    }
+    glowing.sort_unstable();
+    let mut rows: Vec<LightRow> = Vec::new();
+    let mut k = 0;
+    while k < glowing.len() {
+        let place = glowing[k].2;
+        let next = glowing
+            .get(k + 1)
+            .map(|n| n.2)
+            .filter(|&n| table.shade[n].mesh == table.shade[place].mesh);
+        let material = &table.materials[table.shade[place].material as usize];
+        let plain = material.emission_texture == NONE;
+        let quad = next
+            .filter(|_| plain)
+            .and_then(|n| quad(&corners(table, place), &corners(table, n)));
+        let [p, a, b] = corners(table, place);
+        let (p, u, v) = quad.unwrap_or((p, a - p, b - p));
+        let cross = u.cross(v);
+        let kind = if quad.is_some() { RECT } else { TRIANGLE };
+        let square = u.dot(v).abs() < 1e-4 * u.length() * v.length();
+        let area = cross.length() * if quad.is_some() { 1.0 } else { 0.5 };
+        if area > 0.0 {
+            let row = rows.len() as u32;
+            table.shade[place].light = row;
+            if let (Some(n), true) = (next, quad.is_some()) {
+                table.shade[n].light = row;
+            }
+            rows.push(LightRow {
+                p: p.into(),
+                kind,
+                u: u.into(),
+                layer: material.layer,
+                v: v.into(),
+                place: place as u32,
+                n: cross.normalize().into(),
+                area: if kind == RECT && !square { -area } else { area },
+                radiance: [
+                    material.emission[0],
+                    material.emission[1],
+                    material.emission[2],
+                ],
+                cumulative: if material.flags & DOUBLE_SIDED != 0 {
+                    2.0
+                } else {
+                    1.0
+                },
+            });
+        }
+        k += if quad.is_some() { 2 } else { 1 };
+    }
+    rows
+}
+
+fn corners(table: &Table, place: usize) -> [Vec3; 3] {
+    table.corners[table.bvh.order[place] as usize]
+}
+
+/// Corner and edges of the parallelogram that two triangles of the same winding form, if they do.
+fn quad(a: &[Vec3; 3], b: &[Vec3; 3]) -> Option<(Vec3, Vec3, Vec3)> {
+    let size = (a[1] - a[0]).length().max((a[2] - a[0]).length());
+    let same = |p: Vec3, q: Vec3| (p - q).length() <= 1e-5 * size;
+    for i in 0..3 {
+        // The right angle is at a[i]; the diagonal runs from a[i+1] to a[i+2].
+        let (p, q, r) = (a[i], a[(i + 1) % 3], a[(i + 2) % 3]);
+        let far = q + r - p;
+        let has = |x: Vec3| b.iter().any(|&y| same(x, y));
+        let along = (b[1] - b[0]).cross(b[2] - b[0]).dot((q - p).cross(r - p)) > 0.0;
+        if along && has(far) && has(q) && has(r) {
+            return Some((p, q - p, r - p));
+        }
+    }
+    None
+}
+
+fn portal(p: &Portal) -> LightRow {
+    let n = p.edge_u.cross(p.edge_v);
+    let square = p.edge_u.dot(p.edge_v).abs() < 1e-4 * p.edge_u.length() * p.edge_v.length();
+    LightRow {
+        p: p.corner.into(),
+        kind: PORTAL,
+        u: p.edge_u.into(),
+        v: p.edge_v.into(),
+        n: n.try_normalize().unwrap_or(Vec3::Z).into(),
+        area: if square { n.length() } else { -n.length() },
+        place: NONE,
+        ..LightRow::default()
+    }
+}
+
+/// The distribution by power, for scenes with more lights than are weighed at each point.
+fn accumulate(table: &Table, rows: &mut [LightRow]) {
+    let (lo, hi) = table.bvh.bounds();
+    let size = (hi - lo).length_squared().max(1e-6);
+    let power: Vec<f64> = rows
+        .iter()
+        .map(|r| {
+            let lum = f64::from(luminance(Vec3::from(r.radiance)));
+            let pi = std::f64::consts::PI;
+            match r.kind {
+                RECT | TRIANGLE => pi * lum * f64::from(r.area.abs() * r.cumulative),
+                SUN => lum * f64::from(size) * 0.25,
+                SKY => pi * f64::from(table.globals.sky_scale[3]) * f64::from(size) * 0.25,
+                _ => 4.0 * pi * lum,
+            }
+        })
+        .collect();
+    let total: f64 = power.iter().sum::<f64>().max(1e-300);
+    let mut sum = 0.0;
+    let last = rows.len().saturating_sub(1);
+    for (i, row) in rows.iter_mut().enumerate() {
+        sum += power[i];
+        row.cumulative = if i == last { 1.0 } else { (sum / total) as f32 };
+    }
+}

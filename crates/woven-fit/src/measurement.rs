@@ -1,0 +1,341 @@
+//! A measurement as the fit sees it: points with the instrument's kernel, grouped by incidence.
+//!
+//! A goniometer never sees one pair of directions: it averages over its aperture, a Klems patch over some ten
+//! degrees on both sides. Each [`Point`] therefore carries the nodes over which a model must be averaged before it
+//! is compared, and the density with which a gap's delta appears in it.
+
+use anyhow::{Context, Result, bail};
+use sha2::{Digest, Sha256};
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+use woven_bsdf::angles::{degrees, radians};
+use woven_bsdf::measured::csv::Scan;
+use woven_bsdf::measured::klems::{Block, Kind, Klems};
+use woven_bsdf::vec3::Vec3;
+
+/// One pair of directions inside a kernel, with its share of the average.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// Direction to the light.
+    pub l: Vec3<f64>,
+    /// Direction to the viewer.
+    pub v: Vec3<f64>,
+    /// Share; the nodes of a point sum to 1.
+    pub weight: f64,
+}
+
+/// One measured value.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// Direction to the light (centre of the kernel).
+    pub l: Vec3<f64>,
+    /// Direction to the viewer (centre of the kernel).
+    pub v: Vec3<f64>,
+    /// Measured BSDF in 1/sr; for a direct row the transmitted share of the beam.
+    pub f: f64,
+    /// Its standard error, if known.
+    pub sigma: Option<f64>,
+    /// Projected solid angle of the kernel in sr, 0 if unknown.
+    pub area: f64,
+    /// Which incidence it belongs to.
+    pub incidence: usize,
+    /// Whether light and viewer are on opposite sides.
+    pub transmits: bool,
+    /// What a gap of openness 1 adds to the value: 1/area in the straight-through patch, else 0.
+    pub gap_density: f64,
+    /// A row that holds the straight-through light alone, without any scattered light.
+    pub direct_only: bool,
+    /// Range of its nodes.
+    pub nodes: (usize, usize),
+}
+
+/// Points and their kernels.
+#[derive(Clone, Debug, Default)]
+pub struct Points {
+    /// The values.
+    pub points: Vec<Point>,
+    /// The kernels' nodes.
+    pub nodes: Vec<Node>,
+    /// Centre directions to the light.
+    pub incidences: Vec<Vec3<f64>>,
+}
+
+/// What the file is.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// A Klems matrix file.
+    Klems(Klems),
+    /// Scattered points.
+    Scan(Scan),
+}
+
+/// A file read and understood.
+#[derive(Clone, Debug)]
+pub struct Measurement {
+    /// Where it was read.
+    pub path: PathBuf,
+    /// The fabric's name; the file's stem if the file gives none.
+    pub name: String,
+    /// Who made the fabric, if known.
+    pub maker: String,
+    /// SHA-256 of the file, hexadecimal.
+    pub sha256: String,
+    /// The content.
+    pub source: Source,
+}
+
+impl Measurement {
+    /// Reads a Klems XML (`.xml`) or a scan (`.csv`).
+    ///
+    /// # Errors
+    /// A sentence that names the file and what to do.
+    pub fn read(path: &Path) -> Result<Self> {
+        let extension = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_lowercase())
+            .unwrap_or_default();
+        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let sha256 = Sha256::digest(&bytes)
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect();
+        let stem = path
+            .file_stem()
+            .map(|s| s.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let (source, name, maker) = match extension.as_str() {
+            "xml" => {
+                let klems = Klems::read(path)?;
+                let name = if klems.name.is_empty() { stem } else { klems.name.clone() };
+                let maker = klems.manufacturer.clone();
+                (Source::Klems(klems), name, maker)
+            }
+            "csv" => (Source::Scan(Scan::read(path)?), stem, String::new()),
+            other => bail!(
+                "{}: the ending {other:?} is unknown; measurements are .xml (Klems) or .csv (theta_l_deg,…)",
+                path.display()
+            ),
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            name,
+            maker,
+            sha256,
+            source,
+        })
+    }
+
+    /// Scattered points under a name, for data made in memory.
+    pub fn from_scan(name: &str, scan: Scan) -> Self {
+        Self {
+            path: PathBuf::from(format!("{name}.csv")),
+            name: name.to_owned(),
+            maker: String::new(),
+            sha256: Sha256::digest(scan.to_text()).iter().map(|b| format!("{b:02x}")).collect(),
+            source: Source::Scan(scan),
+        }
+    }
+
+    /// The band of a Klems file that is fitted: Visible where there is one, else the first.
+    pub fn band(&self) -> Option<&str> {
+        let Source::Klems(k) = &self.source else { return None };
+        let visible = k.blocks.iter().find(|b| b.band == "Visible");
+        visible.or(k.blocks.first()).map(|b| b.band.as_str())
+    }
+
+    /// The Klems block of a kind in the fitted band.
+    pub fn block(&self, kind: Kind) -> Option<(&Klems, &Block)> {
+        let Source::Klems(k) = &self.source else { return None };
+        k.block(self.band()?, kind).map(|b| (k, b))
+    }
+
+    /// All points of the transmission (or of the reflection) of light from the front, or from the back where the
+    /// file has no front.
+    pub fn points(&self, transmission: bool, detail: Detail, normal_only: bool) -> Points {
+        match &self.source {
+            Source::Klems(k) => {
+                let kinds = if transmission {
+                    [Kind::TransmissionFront, Kind::TransmissionBack]
+                } else {
+                    [Kind::ReflectionFront, Kind::ReflectionBack]
+                };
+                let block = kinds.iter().find_map(|&kind| self.block(kind));
+                block.map_or_else(Points::default, |(_, b)| klems_points(k, b, detail, normal_only))
+            }
+            Source::Scan(scan) => scan_points(scan, transmission, normal_only),
+        }
+    }
+}
+
+/// How finely kernels are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// Few incidences and nodes: for the search from many starts.
+    Coarse,
+    /// Everything: for the fit itself.
+    Full,
+}
+
+/// Point `i` of a rank-one lattice in four dimensions with `n` points (Korobov, generator 76 fits all n here).
+fn lattice(i: usize, n: usize) -> [f64; 4] {
+    // Golden-ratio family of order 4 (roots of x^5 = x + 1): low discrepancy for every n, no table.
+    const A: [f64; 4] = [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_809, 0.538_597_254_759_449];
+    let _ = n;
+    A.map(|a| (0.5 + a * (i as f64 + 0.5)).fract())
+}
+
+/// Angle from straight through (or mirror) beyond which a lobe is smooth over a patch: fewer nodes do.
+const NEAR: f64 = 25.0;
+const MIDDLE: f64 = 50.0;
+
+fn klems_points(k: &Klems, block: &Block, detail: Detail, normal_only: bool) -> Points {
+    let n = k.patches.len();
+    let mut out = Points::default();
+    let used: Vec<usize> = (0..n)
+        .filter(|&i| {
+            let p = k.patches[i];
+            if normal_only {
+                return i == 0;
+            }
+            // The search looks at the normal, and at every other ring at four azimuths and two between.
+            detail == Detail::Full || {
+                let theta = degrees(p.theta());
+                let phi = degrees(p.phi);
+                i == 0 || (theta < 55.0 && (theta / 10.0).round() as i64 % 2 == 0 && phi % 45.0 < 1e-6 && phi <= 180.0)
+            }
+        })
+        .collect();
+    for (index, &i) in used.iter().enumerate() {
+        let incident = k.patches[i];
+        out.incidences.push(block.kind.l((incident.theta(), incident.phi)));
+        for o in 0..n {
+            let outgoing = k.patches[o];
+            let l = block.kind.l((incident.theta(), incident.phi));
+            let v = block.kind.v((outgoing.theta(), outgoing.phi));
+            let mirrored = if block.kind.transmits() { -l } else { Vec3::new(-l.x, -l.y, l.z) };
+            let off = degrees(mirrored.dot(v).clamp(-1.0, 1.0).acos());
+            let count = match (detail, off) {
+                (Detail::Full, a) if a < NEAR => 64,
+                (Detail::Full, a) if a < MIDDLE => 12,
+                (Detail::Full, _) => 4,
+                (Detail::Coarse, a) if a < NEAR => 16,
+                (Detail::Coarse, _) => 2,
+            };
+            let first = out.nodes.len();
+            for s in 0..count {
+                let [a, b, c, d] = lattice(s, count);
+                out.nodes.push(Node {
+                    l: block.kind.l(incident.at(a, b)),
+                    v: block.kind.v(outgoing.at(c, d)),
+                    weight: 1.0 / count as f64,
+                });
+            }
+            let area = outgoing.projected_solid_angle();
+            out.points.push(Point {
+                l,
+                v,
+                f: k.value(block, o, i),
+                sigma: None,
+                area,
+                incidence: index,
+                transmits: block.kind.transmits(),
+                gap_density: if block.kind.transmits() && i == o { 1.0 / area } else { 0.0 },
+                direct_only: false,
+                nodes: (first, out.nodes.len()),
+            });
+        }
+    }
+    out
+}
+
+/// `# aperture_deg,1.5` in a scan: half-angle of the detector's disc as seen from the sample.
+fn aperture(scan: &Scan) -> f64 {
+    let number = |c: &String| c.strip_prefix("aperture_deg,")?.trim().parse::<f64>().ok();
+    let a = scan.comments.iter().find_map(number).unwrap_or(0.0);
+    if a > 0.0 && a < 45.0 { radians(a) } else { 0.0 }
+}
+
+/// Centre and six directions at the radius that makes the average over a disc exact to third order.
+fn disc(v: Vec3<f64>, half_angle: f64) -> Vec<(Vec3<f64>, f64)> {
+    let side = if v.x.abs() < 0.9 { Vec3::new(1.0, 0.0, 0.0) } else { Vec3::new(0.0, 1.0, 0.0) };
+    let t = (side + v * -side.dot(v)).normalize();
+    let b = Vec3::new(v.y * t.z - v.z * t.y, v.z * t.x - v.x * t.z, v.x * t.y - v.y * t.x);
+    // Seven-point rule: 1/4 in the centre, 1/8 at six places on the radius √(2/3) (Abramowitz and Stegun 25.4.61).
+    let radius = half_angle * (2.0_f64 / 3.0).sqrt();
+    let mut out = vec![(v, 0.25)];
+    for i in 0..6 {
+        let phi = PI / 3.0 * f64::from(i);
+        let w = v * radius.cos() + (t * phi.cos() + b * phi.sin()) * radius.sin();
+        out.push((w, 0.125));
+    }
+    out
+}
+
+fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) -> Points {
+    let mut out = Points::default();
+    let aperture = aperture(scan);
+    let incidence = |out: &mut Points, l: Vec3<f64>| {
+        // Directions that differ by less than a hundredth of a degree are one incidence.
+        let same = out.incidences.iter().position(|w| (*w + -l).length_sqr().sqrt() < 1.7e-4);
+        same.unwrap_or_else(|| {
+            out.incidences.push(l);
+            out.incidences.len() - 1
+        })
+    };
+    let steep = radians(89.9).cos();
+    let is_normal = |l: Vec3<f64>| l.z.abs() > radians(0.5).cos();
+    for s in &scan.samples {
+        let transmits = s.l.z * s.v.z < 0.0;
+        if transmits != transmission || (normal_only && !is_normal(s.l)) {
+            continue;
+        }
+        // At grazing angles a BSDF is not defined; the reader has kept the row, the fit leaves it out.
+        if s.l.z.abs() < steep || s.v.z.abs() < steep {
+            continue;
+        }
+        let index = incidence(&mut out, s.l);
+        let first = out.nodes.len();
+        if aperture > 0.0 {
+            out.nodes.extend(disc(s.v, aperture).into_iter().map(|(v, weight)| Node { l: s.l, v, weight }));
+        } else {
+            out.nodes.push(Node { l: s.l, v: s.v, weight: 1.0 });
+        }
+        let area = PI * aperture.sin().powi(2) * s.v.z.abs();
+        let straight = aperture > 0.0 && transmits && (-s.l).dot(s.v) > aperture.cos();
+        out.points.push(Point {
+            l: s.l,
+            v: s.v,
+            f: s.f,
+            sigma: s.sigma,
+            area,
+            incidence: index,
+            transmits,
+            gap_density: if straight { 1.0 / area } else { 0.0 },
+            direct_only: false,
+            nodes: (first, out.nodes.len()),
+        });
+    }
+    if transmission {
+        for d in &scan.direct {
+            if (normal_only && !is_normal(d.l)) || d.l.z.abs() < steep {
+                continue;
+            }
+            let index = incidence(&mut out, d.l);
+            let first = out.nodes.len();
+            out.nodes.push(Node { l: d.l, v: -d.l, weight: 1.0 });
+            out.points.push(Point {
+                l: d.l,
+                v: -d.l,
+                f: d.transmittance,
+                sigma: d.sigma,
+                area: 1.0,
+                incidence: index,
+                transmits: true,
+                gap_density: 1.0,
+                direct_only: true,
+                nodes: (first, out.nodes.len()),
+            });
+        }
+    }
+    out
+}

@@ -1,0 +1,192 @@
+//! The stage: a room with a window, a garden outside, light, a camera, and one curtain whose mesh and fabric are put in.
+//!
+//! The catalog renders it frame by frame, the viewer shows it live.
+//!
+//! ```
+//! use woven_catalog::stage::{Preset, Stage};
+//! let stage = Stage::new(Preset::Day);
+//! assert_eq!(stage.scene().portals.len(), 1);
+//! ```
+
+mod furniture;
+mod light;
+mod outside;
+mod room;
+mod shape;
+mod texture;
+
+use glam::{Vec2, Vec3};
+use woven_render::scene::{Camera, LAYER_LAMPS, Material, Mesh, Scene, Texture, TextureUse};
+
+pub use light::{DUSK, Preset, sun_direction};
+pub use room::{OPENING, RAIL_DISTANCE, RAIL_HEIGHT, ROOM, WALL, portal};
+
+/// Left and right end of the closed curtain on the rail [m].
+pub const CURTAIN_SPAN: (f32, f32) = (-1.16, 0.36);
+/// Height of the hem above the floor [m].
+pub const HEM_HEIGHT: f32 = 0.035;
+
+/// The triangles of a curtain at one moment, in the stage's world (see [`ROOM`]).
+#[derive(Clone, Debug, Default)]
+pub struct CurtainMesh {
+    /// Vertices [m].
+    pub positions: Vec<Vec3>,
+    /// Unit normals, one a vertex.
+    pub normals: Vec<Vec3>,
+    /// u along the weft, v along the warp, one a vertex.
+    pub uvs: Vec<Vec2>,
+    /// Three vertex numbers a triangle.
+    pub indices: Vec<[u32; 3]>,
+}
+
+/// A lit room with a curtain in it.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    scene: Scene,
+    curtain: usize,
+    cloth: usize,
+}
+
+impl Stage {
+    /// The room in the light of `preset`, with an empty rail and an ordinary white cloth.
+    #[must_use]
+    pub fn new(preset: Preset) -> Self {
+        let mut builder = Builder::default();
+        room::build(&mut builder);
+        furniture::build(&mut builder, preset.lamps());
+        outside::build(&mut builder);
+        let mut scene = builder.scene;
+        let cloth = scene.materials.len();
+        scene.materials.push(Material::diffuse_sheet("curtain", [0.45; 3], [0.35; 3], 0.02));
+        let curtain = scene.meshes.len();
+        scene.meshes.push(Mesh { name: "curtain".to_owned(), material: cloth, moving: true, ..Mesh::default() });
+        scene.lights.extend(preset.sun());
+        scene.environment = Some(preset.sky());
+        scene.portals.push(room::portal());
+        scene.camera = Camera { exposure: preset.exposure(), ..camera() };
+        Self { scene, curtain, cloth }
+    }
+
+    /// Hangs a curtain on the rail, in the place of the one that hung there.
+    #[must_use]
+    pub fn with_curtain(mut self, mesh: CurtainMesh) -> Self {
+        self.set_curtain(mesh);
+        self
+    }
+
+    /// Hangs a curtain on the rail, in the place of the one that hung there.
+    pub fn set_curtain(&mut self, mesh: CurtainMesh) {
+        let place = &mut self.scene.meshes[self.curtain];
+        let CurtainMesh { positions, normals, uvs, indices } = mesh;
+        (place.positions, place.normals, place.uvs, place.indices) = (positions, normals, uvs, indices);
+    }
+
+    /// Weaves the curtain of another material; its name stays "curtain".
+    pub fn set_material(&mut self, material: Material) {
+        self.scene.materials[self.cloth] = Material { name: "curtain".to_owned(), ..material };
+    }
+
+    /// The scene to render.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The scene, to be changed further: camera, exposure, lights.
+    pub fn scene_mut(&mut self) -> &mut Scene {
+        &mut self.scene
+    }
+
+    /// Number of the curtain's mesh in the scene.
+    #[must_use]
+    pub const fn curtain(&self) -> usize {
+        self.curtain
+    }
+
+    /// Number of the curtain's material in the scene.
+    #[must_use]
+    pub const fn cloth(&self) -> usize {
+        self.cloth
+    }
+}
+
+/// The eye: standing in the room, a little to the right, looking at the curtain.
+fn camera() -> Camera {
+    Camera::look_at(Vec3::new(0.42, 1.34, 4.35), Vec3::new(-0.02, 1.20, 0.0), Vec3::Y, 36_f32.to_radians())
+}
+
+/// A scene being put together.
+#[derive(Default)]
+struct Builder {
+    scene: Scene,
+}
+
+impl Builder {
+    fn add(&mut self, mesh: Mesh) {
+        self.scene.meshes.push(mesh);
+    }
+
+    fn material(&mut self, material: Material) -> usize {
+        self.scene.materials.push(material);
+        self.scene.materials.len() - 1
+    }
+
+    fn matt(&mut self, name: &str, albedo: [f32; 3]) -> usize {
+        self.material(Material::matt(name, albedo))
+    }
+
+    /// Leaves: a matt sheet that also lets light through.
+    fn leafy(&mut self, name: &str, reflect: [f32; 3], transmit: [f32; 3]) -> usize {
+        self.material(Material::diffuse_sheet(name, reflect, transmit, 0.0))
+    }
+
+    fn textured(&mut self, name: &str, tint: [f32; 3], texture: TextureUse) -> usize {
+        self.material(Material { color_texture: Some(texture), ..Material::matt(name, tint) })
+    }
+
+    fn lamp(&mut self, name: &str, radiance: [f32; 3], albedo: [f32; 3]) -> usize {
+        let shade = Material { emission: radiance, double_sided: true, layer: LAYER_LAMPS, ..Material::matt(name, albedo) };
+        self.material(shade)
+    }
+
+    fn texture(&mut self, texture: Texture) -> usize {
+        self.scene.textures.push(texture);
+        self.scene.textures.len() - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_mesh_is_whole() {
+        for preset in [Preset::Day, Preset::Evening, Preset::All] {
+            let stage = Stage::new(preset);
+            let scene = stage.scene();
+            for mesh in &scene.meshes {
+                assert!(mesh.material < scene.materials.len(), "{}", mesh.name);
+                assert_eq!(mesh.normals.len(), mesh.positions.len(), "{}", mesh.name);
+                assert_eq!(mesh.uvs.len(), mesh.positions.len(), "{}", mesh.name);
+                assert!(mesh.indices.iter().flatten().all(|&i| (i as usize) < mesh.positions.len()), "{}", mesh.name);
+                assert!(mesh.positions.iter().chain(&mesh.normals).all(|p| p.is_finite()), "{}", mesh.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_eye_is_inside_and_the_sun_outside() {
+        let eye = camera().transform.w_axis.truncate();
+        assert!(eye.cmpgt(ROOM.0).all() && eye.cmplt(ROOM.1).all());
+        assert!(sun_direction().z < 0.0 && sun_direction().y > 0.0);
+        let portal = portal();
+        assert!(portal.edge_u.cross(portal.edge_v).z > 0.0, "the portal's normal points into the room");
+    }
+
+    #[test]
+    fn lamps_are_off_by_day_and_the_sun_is_down_in_the_evening() {
+        let lit = |preset| Stage::new(preset).scene.materials.iter().any(|m| m.emission != [0.0; 3]);
+        assert!(!lit(Preset::Day) && lit(Preset::Evening) && lit(Preset::All));
+        assert!(Stage::new(Preset::Evening).scene.lights.is_empty());
+    }
+}

@@ -64,7 +64,7 @@ pub enum Error {
     },
     /// The controller restarted by itself.
     #[error(
-        "The controller restarted during {command} (it sent its welcome line), so its positions are lost; start again (the scan re-homes and resumes)."
+        "The controller restarted during {command} (a reset or a cut of its power), so its positions are lost; start again (the scan re-homes and resumes)."
     )]
     Restarted {
         /// The command.

@@ -73,7 +73,7 @@ enum Command {
     },
     /// Runs a scan, or goes on with one whose log exists.
     #[command(
-        after_help = "Example: ogm scan --port /dev/ttyUSB0 --plan assets/plans/paper.toml -o lace.ogm\n\nCtrl-C stops the arms; the same command goes on from the last stored point."
+        after_help = "Example: ogm scan --port /dev/ttyUSB0 --plan crates/ogm-driver/plans/paper.toml -o lace.ogm\n\nCtrl-C stops the arms; the same command goes on from the last stored point."
     )]
     Scan {
         /// The port's name.
@@ -93,7 +93,7 @@ enum Command {
         verbose: bool,
     },
     /// Checks a plan against a rig and tells its poses and its time, without a port (dry run).
-    #[command(after_help = "Example: ogm plan assets/plans/paper.toml --list")]
+    #[command(after_help = "Example: ogm plan crates/ogm-driver/plans/paper.toml --list")]
     Plan {
         /// The plan file.
         plan: PathBuf,

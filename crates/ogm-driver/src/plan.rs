@@ -644,6 +644,20 @@ mod tests {
     }
 
     #[test]
+    fn the_plans_beside_this_crate_can_be_run() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("plans");
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let route = Plan::load(&path).and_then(|p| p.route(&Rig::default()));
+            assert!(
+                route.is_ok_and(|r| r.poses.len() > 50 && r.left_out == 0),
+                "{}",
+                path.display()
+            );
+        }
+    }
+
+    #[test]
     fn bad_plans_are_sentences() {
         for text in [
             "",

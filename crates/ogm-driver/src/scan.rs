@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use crate::controller::{Controller, controller_for};
 use crate::detector::{Detector, SerialPhotodiode, Shot};
 use crate::error::{Error, Result};
-use crate::log::{FORMAT, Reading, Record, What, Writer};
+use crate::log::{FORMAT, Reading, Record, What, Worker, Writer};
 use crate::plan::Plan;
 use crate::pose::{AXES, Pose};
 use crate::rig::{Holder, Rig, output_bits};
@@ -109,6 +109,7 @@ pub fn run_with(
         watcher.say("The scan is complete; nothing is left to measure.");
         return Ok(outcome(found));
     }
+    let mut log = Worker::new(log)?;
     let controller = controller_for(rig);
     let link = Link::new(transport, stop.clone(), controller.stop_bytes());
     let mut bench = Bench {
@@ -225,7 +226,7 @@ impl Bench<'_> {
     /// One session from homing to the end or the first failure; returns the number of stored points.
     fn session(
         &mut self,
-        log: &mut Writer,
+        log: &mut Worker,
         poses: &[Pose],
         start: Start,
         torn_bytes: u64,
@@ -246,7 +247,7 @@ impl Bench<'_> {
             lamp_s,
             torn_bytes,
         };
-        log.append(&session)?;
+        log.append(&session, || self.link.stop_if_asked())?;
         self.calibrate(log, &start, watcher)?;
         let mut stored = start.done.iter().filter(|d| **d).count();
         for (index, pose) in poses.iter().enumerate() {
@@ -288,7 +289,9 @@ impl Bench<'_> {
                 )?;
             }
         }
-        log.append(&Record::End { points: stored })?;
+        log.append(&Record::End { points: stored }, || {
+            self.link.stop_if_asked();
+        })?;
         self.outputs(output_bits(false, Holder::Sample))?;
         Ok(stored)
     }
@@ -323,7 +326,7 @@ impl Bench<'_> {
     /// Dark, direct and white readings that the log does not have yet; after a resume one reference check.
     fn calibrate(
         &mut self,
-        log: &mut Writer,
+        log: &mut Worker,
         start: &Start,
         watcher: &mut dyn Watcher,
     ) -> Result<()> {
@@ -402,7 +405,7 @@ impl Bench<'_> {
     /// Moves, verifies, settles, exposes, and returns when the reading is on the disk.
     fn reading(
         &mut self,
-        log: &mut Writer,
+        log: &mut Worker,
         what: What,
         index: usize,
         pose: Pose,
@@ -456,7 +459,9 @@ impl Bench<'_> {
             wall_s: wall_seconds(),
             scan_s,
         };
-        log.append(&Record::Reading(reading.clone()))?;
+        log.append(&Record::Reading(reading.clone()), || {
+            self.link.stop_if_asked();
+        })?;
         watcher.stored(&reading, count.0, count.1);
         Ok(reading)
     }

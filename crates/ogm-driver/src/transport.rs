@@ -98,6 +98,12 @@ impl Link {
         Err(Error::Stopped)
     }
 
+    /// Sends the stop bytes if a stop was asked for, for places that cannot end in the middle.
+    pub fn stop_if_asked(&mut self) {
+        // The error is raised again by the next call that may end.
+        let _ = self.check_stop();
+    }
+
     /// Sends the stop bytes now, whatever else is going on; a port that is gone is no error here.
     pub fn send_stop(&mut self) {
         let mut bytes = if self.mid_line {

@@ -100,6 +100,10 @@ impl Controller for GrblController {
     }
 
     fn home(&mut self, link: &mut Link, rig: &Rig) -> Result<[i64; AXES]> {
+        // An earlier session may have died in the middle of a move: a reset ends it, and homing finds the positions again.
+        link.send(&[RealTime::Reset.byte()], rig.reply())?;
+        link.wait(Duration::from_millis(50))?;
+        link.discard_input()?;
         self.order(link, &Line::Home, Duration::from_secs(rig.home_s))?;
         let report = self.report(link, rig, "$H")?;
         if report.state != State::Idle {

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::{Controller, QUESTION_TRIES, verify};
+use crate::axis::Axis;
 use crate::error::{Error, Result};
 use crate::pose::AXES;
 use crate::protocol::shot::{self, Command, Model, Query, Speed, Status, Which};
@@ -12,12 +13,17 @@ use crate::transport::Link;
 /// A four-axis SHOT controller with COMM/ACK = MAIN (every command is answered OK or NG).
 pub struct ShotController {
     model: Model,
+    /// The controller's own account of its speeds after homing.
+    speeds: Option<String>,
 }
 
 impl ShotController {
     /// A controller of the given model.
     pub fn new(model: Model) -> Self {
-        ShotController { model }
+        ShotController {
+            model,
+            speeds: None,
+        }
     }
 
     fn bytes(&self, command: &Command) -> Result<Vec<u8>> {
@@ -66,6 +72,27 @@ impl ShotController {
         Err(Error::Refused { command: name, why })
     }
 
+    /// The answer to `?:DW`, as text.
+    fn speeds(&self, link: &mut Link, rig: &Rig) -> Result<String> {
+        link.ask(
+            &self.bytes(&Command::Ask(Query::Speeds))?,
+            rig.reply(),
+            QUESTION_TRIES,
+            |line| Ok(line.starts_with('S').then(|| line.to_string())),
+        )
+    }
+
+    /// A power cut sets the counters to 0 wherever the arms are, and a move after it "arrives" at a false place: only the speeds, set before homing
+    /// and lost with the power, tell.
+    fn still_powered(&self, link: &mut Link, rig: &Rig, command: &str) -> Result<()> {
+        if self.speeds.is_some() && self.speeds != Some(self.speeds(link, rig)?) {
+            return Err(Error::Restarted {
+                command: command.into(),
+            });
+        }
+        Ok(())
+    }
+
     /// Waits until the arms rest, then returns the status that says so. `expected` is how long it should take.
     fn rest(
         &self,
@@ -96,6 +123,16 @@ impl ShotController {
             link.wait(pause)?;
             pause = (pause * 2).min(Duration::from_millis(50));
         }
+    }
+}
+
+fn speed(axis: &Axis) -> Speed {
+    let top = axis.speed_pps();
+    let least = if top >= 8000 { 64 } else { 1 };
+    Speed {
+        start: axis.start_pps().max(least).min(top),
+        top,
+        ramp_ms: axis.ramp_ms.min(1000),
     }
 }
 
@@ -140,19 +177,23 @@ impl Controller for ShotController {
     }
 
     fn home(&mut self, link: &mut Link, rig: &Rig) -> Result<[i64; AXES]> {
-        let speeds = rig.axes.iter().map(|a| Speed {
-            start: a
-                .start_pps()
-                .max(if a.speed_pps() >= 8000 { 64 } else { 1 })
-                .min(a.speed_pps()),
-            top: a.speed_pps(),
-            ramp_ms: a.ramp_ms.min(1000),
-        });
-        self.order(link, rig, &Command::Speeds(Which::All, speeds.collect()))?;
+        // An earlier session may have died in the middle of a move.
+        self.speeds = None;
+        self.order(link, rig, &Command::StopNow)?;
+        self.rest(link, rig, "L:E", 0.0, rig.reply())?;
+        let mut speeds: Vec<Speed> = rig.axes.iter().map(speed).collect();
+        // The last ramp differs by a millisecond from what anybody would have stored as the default: the mark by which a power cut is seen.
+        if let Some(last) = speeds.last_mut() {
+            last.ramp_ms = last.ramp_ms.min(998) ^ 1;
+        }
+        self.order(link, rig, &Command::Speeds(Which::All, speeds))?;
+        let speeds = self.speeds(link, rig)?;
         self.order(link, rig, &Command::Home(Which::All, Vec::new()))?;
         let status = self.rest(link, rig, "H:W", 0.0, Duration::from_secs(rig.home_s))?;
         let positions = four(&status.positions);
         verify(rig, "H:W", &[0; AXES], &positions)?;
+        self.speeds = Some(speeds);
+        self.still_powered(link, rig, "H:W")?;
         Ok(positions)
     }
 
@@ -183,6 +224,7 @@ impl Controller for ShotController {
             reached = four(&self.status(link, rig)?.positions);
             verify(rig, &name, target, &reached)?;
         }
+        self.still_powered(link, rig, &name)?;
         Ok(reached)
     }
 
@@ -194,7 +236,11 @@ impl Controller for ShotController {
                 why: "the arms are moving although nothing was asked of them".into(),
             });
         }
-        Ok(four(&status.positions))
+        let positions = four(&status.positions);
+        if positions == [0; AXES] {
+            self.still_powered(link, rig, "Q:")?;
+        }
+        Ok(positions)
     }
 
     fn set_outputs(&mut self, link: &mut Link, rig: &Rig, bits: u8) -> Result<()> {

@@ -92,6 +92,8 @@ pub struct Bench {
     pub wrong: Imperfections,
     /// When the lamp went off, if it did.
     pub lamp_off_at: Option<f64>,
+    /// Every exposure, when kept: its tag, the true pose, whether an arm moved.
+    pub exposures: Option<Vec<(u64, Pose, bool)>>,
     sample: Arc<dyn Sample>,
 }
 
@@ -116,6 +118,7 @@ impl Bench {
             outputs: 0,
             wrong,
             lamp_off_at: None,
+            exposures: None,
             sample,
         }
     }
@@ -165,7 +168,11 @@ impl Bench {
 
     /// Exposes for `exposure_ms` at `f_number`, beginning at `now`. `tag` is the counter of the noise.
     pub fn expose(&mut self, now: f64, exposure_ms: f64, f_number: f64, tag: u64) -> Shot {
+        let moving = self.update(now);
         let pose = self.true_pose(now);
+        if let Some(list) = &mut self.exposures {
+            list.push((tag, pose, moving));
+        }
         let middle = now + exposure_ms / 2000.0;
         let lamp = self.lamp(middle);
         let d = &self.rig.detector;

@@ -44,6 +44,8 @@ pub(crate) trait Firmware: Send {
 pub struct WireLine {
     /// Seconds of the simulation.
     pub at: f64,
+    /// The wall clock's moment.
+    pub wall: std::time::Instant,
     /// Sent by the host.
     pub to_rig: bool,
     /// Without its line end.
@@ -289,6 +291,7 @@ impl Device {
         if let Some(journal) = &mut self.journal {
             journal.push(WireLine {
                 at,
+                wall: std::time::Instant::now(),
                 to_rig,
                 text: text(),
             });

@@ -18,7 +18,11 @@ use woven_fit::{report, text};
 
 /// Fits models of woven cloth to goniometer measurements.
 #[derive(Debug, Parser)]
-#[command(name = "woven-fit", version, after_help = "Example: woven-fit fit assets/measurements/klems_aniso_high.xml --out fit/")]
+#[command(
+    name = "woven-fit",
+    version,
+    after_help = "Example: woven-fit fit assets/measurements/klems_aniso_high.xml --out fit/"
+)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -27,10 +31,14 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Fit models to measurements; print the ranking, write fit.json, a fabric and a report.
-    #[command(after_help = "Example: woven-fit fit lace.xml --model sheet,ggx-mirrored,hgf --out fit/")]
+    #[command(
+        after_help = "Example: woven-fit fit lace.xml --model sheet,ggx-mirrored,hgf --out fit/"
+    )]
     Fit(FitArgs),
     /// Evaluate a model at directions: columns lx,ly,lz,vx,vy,vz in; the same plus f,pdf out.
-    #[command(after_help = "Example: woven-fit eval --model ggx-mirrored --param k_d=0.1,k_t=0.3,alpha_x=0.1,alpha_y=0.2 dirs.csv")]
+    #[command(
+        after_help = "Example: woven-fit eval --model ggx-mirrored --param k_d=0.1,k_t=0.3,alpha_x=0.1,alpha_y=0.2 dirs.csv"
+    )]
     Eval {
         /// The model's name; see `woven-fit models`.
         #[arg(long)]
@@ -112,7 +120,11 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Models { json } => models(json),
         Command::Info { data, json } => {
             let info = info(&Measurement::read(&data)?);
-            let text = if json { serde_json::to_string_pretty(&info)? + "\n" } else { info.to_text() };
+            let text = if json {
+                serde_json::to_string_pretty(&info)? + "\n"
+            } else {
+                info.to_text()
+            };
             Ok(std::io::stdout().lock().write_all(text.as_bytes())?)
         }
         Command::Convert { input, output } => convert(&input, &output),
@@ -154,8 +166,15 @@ fn fit(args: &FitArgs) -> Result<()> {
             std::process::exit(130);
         }
     });
-    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(1) } else { ProgressBar::hidden() };
-    bar.set_style(ProgressStyle::with_template("{msg:28} {bar:24} {pos}/{len} models, {per_sec}, {eta} left").expect("a fixed template"));
+    let bar = if std::io::stderr().is_terminal() {
+        ProgressBar::new(1)
+    } else {
+        ProgressBar::hidden()
+    };
+    bar.set_style(
+        ProgressStyle::with_template("{msg:28} {bar:24} {pos}/{len} models, {per_sec}, {eta} left")
+            .expect("a fixed template"),
+    );
     for path in &args.data {
         bar.reset();
         let progress = |done: usize, total: usize, what: &str| {
@@ -166,7 +185,9 @@ fn fit(args: &FitArgs) -> Result<()> {
         };
         let result = fit_measurement(path, &options, &progress)?;
         bar.finish_and_clear();
-        std::io::stdout().lock().write_all(text::whole(&result).as_bytes())?;
+        std::io::stdout()
+            .lock()
+            .write_all(text::whole(&result).as_bytes())?;
         if let Some(out) = &args.out {
             write_results(out, path, &result, args.data.len() > 1)?;
         }
@@ -176,15 +197,29 @@ fn fit(args: &FitArgs) -> Result<()> {
 
 /// Makes the folder and proves that it can be written, before minutes of work.
 fn prepare_folder(out: &Path) -> Result<()> {
-    std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    std::fs::create_dir_all(out)
+        .with_context(|| format!("cannot make the folder {}", out.display()))?;
     tempfile::NamedTempFile::new_in(out)
         .map(drop)
-        .with_context(|| format!("cannot write into the folder {}; choose another with --out", out.display()))
+        .with_context(|| {
+            format!(
+                "cannot write into the folder {}; choose another with --out",
+                out.display()
+            )
+        })
 }
 
 fn write_results(out: &Path, data: &Path, result: &FitResult, many: bool) -> Result<()> {
-    let stem = data.file_stem().map_or("measurement".into(), |s| s.to_string_lossy());
-    let name = |end: &str| if many { format!("{stem}.{end}") } else { end.to_owned() };
+    let stem = data
+        .file_stem()
+        .map_or("measurement".into(), |s| s.to_string_lossy());
+    let name = |end: &str| {
+        if many {
+            format!("{stem}.{end}")
+        } else {
+            end.to_owned()
+        }
+    };
     let command = command_line();
     let mut json = serde_json::to_value(result)?;
     if let Some(map) = json.as_object_mut() {
@@ -194,7 +229,10 @@ fn write_results(out: &Path, data: &Path, result: &FitResult, many: bool) -> Res
     if !many {
         written[0] = "fit.json".to_owned();
     }
-    write_atomically(&out.join(&written[0]), (serde_json::to_string_pretty(&json)? + "\n").as_bytes())?;
+    write_atomically(
+        &out.join(&written[0]),
+        (serde_json::to_string_pretty(&json)? + "\n").as_bytes(),
+    )?;
     if let Some(fabric) = result.fabric(&command) {
         let file = format!("{stem}.toml");
         let head = format!("# {command}\n");
@@ -202,7 +240,10 @@ fn write_results(out: &Path, data: &Path, result: &FitResult, many: bool) -> Res
         written.push(file);
     }
     let report_name = name("report.html");
-    write_atomically(&out.join(&report_name), report::html(result, &command).as_bytes())?;
+    write_atomically(
+        &out.join(&report_name),
+        report::html(result, &command).as_bytes(),
+    )?;
     written.push(report_name);
     println!("written to {}: {}", out.display(), written.join(", "));
     Ok(())
@@ -218,15 +259,31 @@ fn eval(name: &str, params: &[String], dirs: &Path) -> Result<()> {
     let model = models_named(Some(&[name.to_owned()]))?[0];
     let mut values = model.start();
     for pair in params {
-        let (key, value) = pair.split_once('=').ok_or_else(|| anyhow!("{pair:?} is not of the form key=value"))?;
-        let index = model.params.iter().position(|p| p.name == key.trim()).ok_or_else(|| {
-            let known: Vec<&str> = model.params.iter().map(|p| p.name).collect();
-            anyhow!("{name} has no parameter {key:?}; it has {}", known.join(", "))
-        })?;
+        let (key, value) = pair
+            .split_once('=')
+            .ok_or_else(|| anyhow!("{pair:?} is not of the form key=value"))?;
+        let index = model
+            .params
+            .iter()
+            .position(|p| p.name == key.trim())
+            .ok_or_else(|| {
+                let known: Vec<&str> = model.params.iter().map(|p| p.name).collect();
+                anyhow!(
+                    "{name} has no parameter {key:?}; it has {}",
+                    known.join(", ")
+                )
+            })?;
         let p = &model.params[index];
-        let value: f64 = value.trim().parse().map_err(|_| anyhow!("{key} = {value:?} is not a number"))?;
+        let value: f64 = value
+            .trim()
+            .parse()
+            .map_err(|_| anyhow!("{key} = {value:?} is not a number"))?;
         // Linear factors may exceed their usual range (relative scans); shapes may not.
-        let max = if p.role == Role::Linear { f64::MAX } else { p.max };
+        let max = if p.role == Role::Linear {
+            f64::MAX
+        } else {
+            p.max
+        };
         if !(p.min..=max).contains(&value) {
             bail!("{key} = {value} lies outside {}…{}", p.min, p.max);
         }
@@ -239,14 +296,19 @@ fn eval(name: &str, params: &[String], dirs: &Path) -> Result<()> {
         .comment(Some(b'#'))
         .from_path(dirs)
         .with_context(|| format!("cannot read {}", dirs.display()))?;
-    let header = reader.headers().with_context(|| format!("cannot read {}", dirs.display()))?.clone();
+    let header = reader
+        .headers()
+        .with_context(|| format!("cannot read {}", dirs.display()))?
+        .clone();
     let columns: Vec<usize> = ["lx", "ly", "lz", "vx", "vy", "vz"]
         .iter()
         .map(|c| {
-            header
-                .iter()
-                .position(|h| h == *c)
-                .ok_or_else(|| anyhow!("{}: there is no column {c}; the header must name lx,ly,lz,vx,vy,vz", dirs.display()))
+            header.iter().position(|h| h == *c).ok_or_else(|| {
+                anyhow!(
+                    "{}: there is no column {c}; the header must name lx,ly,lz,vx,vy,vz",
+                    dirs.display()
+                )
+            })
         })
         .collect::<Result<_>>()?;
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
@@ -257,7 +319,9 @@ fn eval(name: &str, params: &[String], dirs: &Path) -> Result<()> {
         let mut c = [0.0; 6];
         for (c, &column) in c.iter_mut().zip(&columns) {
             let word = &record[column];
-            *c = word.parse().map_err(|_| anyhow!("{} line {line}: {word:?} is not a number", dirs.display()))?;
+            *c = word
+                .parse()
+                .map_err(|_| anyhow!("{} line {line}: {word:?} is not a number", dirs.display()))?;
         }
         let (Some(l), Some(v)) = (unit(c[0], c[1], c[2]), unit(c[3], c[4], c[5])) else {
             bail!("{} line {line}: a direction has no length", dirs.display());
@@ -265,7 +329,11 @@ fn eval(name: &str, params: &[String], dirs: &Path) -> Result<()> {
         let f = model::dot(&linear, &(model.f64.basis)(&shape, l, v));
         // The density with which the model's sampler, standing at v, chooses l.
         let pdf = (model.f64.pdf)(&shape, &weights, v, l);
-        writeln!(out, "{},{f},{pdf}", record.iter().collect::<Vec<_>>().join(","))?;
+        writeln!(
+            out,
+            "{},{f},{pdf}",
+            record.iter().collect::<Vec<_>>().join(",")
+        )?;
     }
     Ok(out.flush()?)
 }
@@ -295,9 +363,21 @@ fn models(json: bool) -> Result<()> {
     for m in MODELS {
         writeln!(out, "{}\n  f = {}\n  {}", m.name, m.equation, m.doc)?;
         for p in m.params {
-            let role = if p.role == Role::Linear { "factor" } else { "shape" };
-            let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
-            writeln!(out, "    {:<11} {role:<6} {}…{}{unit}, start {}: {}", p.name, p.min, p.max, p.start, p.meaning)?;
+            let role = if p.role == Role::Linear {
+                "factor"
+            } else {
+                "shape"
+            };
+            let unit = if p.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {}", p.unit)
+            };
+            writeln!(
+                out,
+                "    {:<11} {role:<6} {}…{}{unit}, start {}: {}",
+                p.name, p.min, p.max, p.start, p.meaning
+            )?;
         }
         writeln!(out)?;
     }

@@ -12,7 +12,10 @@ use woven_bsdf::measured::klems::{Kind, Klems};
 /// # Errors
 /// A sentence that names the file.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let attempt = || -> std::io::Result<()> {
         let mut file = tempfile::NamedTempFile::new_in(folder)?;
         file.write_all(bytes)?;
@@ -21,12 +24,18 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
-            file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
+            file.as_file()
+                .set_permissions(std::fs::Permissions::from_mode(0o644))?;
         }
         file.persist(path).map_err(|e| e.error)?;
         Ok(())
     };
-    attempt().with_context(|| format!("cannot write {}; is the folder there and writable?", path.display()))
+    attempt().with_context(|| {
+        format!(
+            "cannot write {}; is the folder there and writable?",
+            path.display()
+        )
+    })
 }
 
 /// Reads one format and writes another, by the endings of the file names.
@@ -35,7 +44,10 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 /// A sentence when the way is not known or a file cannot be read or written.
 pub fn convert(input: &Path, output: &Path) -> Result<()> {
     let data = Measurement::read(input)?;
-    let end = output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let end = output
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
     let scan = match (&data.source, end.as_str()) {
         (Source::Scan(scan), "csv") => scan.clone(),
         (Source::Klems(k), "csv") => scan_of(k, &data)?,
@@ -51,7 +63,11 @@ pub fn convert(input: &Path, output: &Path) -> Result<()> {
 /// The fitted band of a matrix file as scattered points at the patches' centres; the straight-through patches become
 /// `direct` lines with their whole transmittance.
 fn scan_of(k: &Klems, data: &Measurement) -> Result<Scan> {
-    let file = data.path.file_name().map(|f| f.to_string_lossy().into_owned()).unwrap_or_default();
+    let file = data
+        .path
+        .file_name()
+        .map(|f| f.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let mut scan = Scan {
         comments: vec![
             format!("woven-fit convert {file}"),
@@ -60,13 +76,24 @@ fn scan_of(k: &Klems, data: &Measurement) -> Result<Scan> {
         ],
         ..Scan::default()
     };
-    for kind in [Kind::TransmissionFront, Kind::TransmissionBack, Kind::ReflectionFront, Kind::ReflectionBack] {
-        let Some((_, block)) = data.block(kind) else { continue };
+    for kind in [
+        Kind::TransmissionFront,
+        Kind::TransmissionBack,
+        Kind::ReflectionFront,
+        Kind::ReflectionBack,
+    ] {
+        let Some((_, block)) = data.block(kind) else {
+            continue;
+        };
         for (i, incident) in k.patches.iter().enumerate() {
             let l = kind.l((incident.theta(), incident.phi));
             for (o, outgoing) in k.patches.iter().enumerate() {
                 if kind.transmits() && i == o {
-                    scan.direct.push(Direct { l, transmittance: k.straight(block, i), sigma: None });
+                    scan.direct.push(Direct {
+                        l,
+                        transmittance: k.straight(block, i),
+                        sigma: None,
+                    });
                     continue;
                 }
                 scan.samples.push(Sample {

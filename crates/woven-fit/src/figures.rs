@@ -64,13 +64,21 @@ pub fn slices(points: &Points) -> Vec<Slice> {
                     let across = if axis == 0 { l.y } else { l.x };
                     across.abs() < 0.02
                 })
-                .min_by(|&a, &b| (angle(a) - target).abs().total_cmp(&(angle(b) - target).abs()));
+                .min_by(|&a, &b| {
+                    (angle(a) - target)
+                        .abs()
+                        .total_cmp(&(angle(b) - target).abs())
+                });
             let Some(best) = best else { continue };
             if (angle(best) - target).abs() > 7.0 {
                 continue;
             }
             let s = slice(points, best, phi);
-            if s.rows.len() >= 5 && !out.iter().any(|o: &Slice| o.incidence == best && (o.phi_deg - s.phi_deg).abs() < 1.0) {
+            if s.rows.len() >= 5
+                && !out
+                    .iter()
+                    .any(|o: &Slice| o.incidence == best && (o.phi_deg - s.phi_deg).abs() < 1.0)
+            {
                 out.push(s);
             }
         }
@@ -83,12 +91,22 @@ pub fn slices(points: &Points) -> Vec<Slice> {
     out
 }
 
-fn series(name: &str, color: &'static str, mark: Mark, slice: &Slice, value: &dyn Fn(usize) -> f64) -> Series {
+fn series(
+    name: &str,
+    color: &'static str,
+    mark: Mark,
+    slice: &Slice,
+    value: &dyn Fn(usize) -> f64,
+) -> Series {
     Series {
         name: name.to_owned(),
         color,
         mark,
-        points: slice.rows.iter().map(|&(a, i)| (degrees(a), value(i))).collect(),
+        points: slice
+            .rows
+            .iter()
+            .map(|&(a, i)| (degrees(a), value(i)))
+            .collect(),
     }
 }
 
@@ -99,20 +117,32 @@ pub fn slice_chart(points: &Points, slice: &Slice, models: &[&ModelFit], scale: 
         .zip(COLORS)
         .map(|(m, color)| series(&m.label, color, Mark::Line, slice, &|i| m.fitted[i]))
         .collect();
-    list.push(series("measured", "#111", Mark::Dots, slice, &|i| points.points[i].f));
-    let title = format!("incidence {:.0}°, plane φ = {:.0}°{}", slice.theta_deg, slice.phi_deg, if scale == Scale::Log { ", log" } else { "" });
+    list.push(series("measured", "#111", Mark::Dots, slice, &|i| {
+        points.points[i].f
+    }));
+    let title = format!(
+        "incidence {:.0}°, plane φ = {:.0}°{}",
+        slice.theta_deg,
+        slice.phi_deg,
+        if scale == Scale::Log { ", log" } else { "" }
+    );
     chart(&title, "outgoing angle θ (°)", "f (1/sr)", &list, scale)
 }
 
 /// Misfit over value, in per cent, of one slice.
 pub fn residual_chart(points: &Points, slice: &Slice, models: &[&ModelFit]) -> String {
-    let ratio = |m: &ModelFit, i: usize| 100.0 * (m.fitted[i] / points.points[i].f.max(1e-12) - 1.0).clamp(-2.0, 5.0);
+    let ratio = |m: &ModelFit, i: usize| {
+        100.0 * (m.fitted[i] / points.points[i].f.max(1e-12) - 1.0).clamp(-2.0, 5.0)
+    };
     let list: Vec<Series> = models
         .iter()
         .zip(COLORS)
         .map(|(m, color)| series(&m.label, color, Mark::Dots, slice, &|i| ratio(m, i)))
         .collect();
-    let title = format!("model / measured - 1, incidence {:.0}°, plane φ = {:.0}°", slice.theta_deg, slice.phi_deg);
+    let title = format!(
+        "model / measured - 1, incidence {:.0}°, plane φ = {:.0}°",
+        slice.theta_deg, slice.phi_deg
+    );
     chart(&title, "outgoing angle θ (°)", "%", &list, Scale::Linear)
 }
 
@@ -120,7 +150,11 @@ pub fn residual_chart(points: &Points, slice: &Slice, models: &[&ModelFit]) -> S
 ///
 /// `theta_deg` picks the nearest incidence in the weft plane (`phi` = 0) or another plane of azimuth `phi` radians.
 pub fn polar_plot(result: &FitResult, theta_deg: f64, phi: f64) -> String {
-    let sheet = result.ranking.iter().find(|f| f.label == "sheet").or(result.ranking.first());
+    let sheet = result
+        .ranking
+        .iter()
+        .find(|f| f.label == "sheet")
+        .or(result.ranking.first());
     let mut data = Vec::new();
     let mut model = Vec::new();
     let mut found_deg = 0.0;
@@ -129,18 +163,28 @@ pub fn polar_plot(result: &FitResult, theta_deg: f64, phi: f64) -> String {
         (&result.reflection_points, result.reflection.as_ref(), false),
     ];
     for (points, fit, transmits) in halves {
-        let Some(incidence) = nearest(points, theta_deg, phi) else { continue };
+        let Some(incidence) = nearest(points, theta_deg, phi) else {
+            continue;
+        };
         let s = slice(points, incidence, phi);
         if transmits {
             found_deg = s.theta_deg;
         }
         // Light comes from the upper left: the straight-through direction has a positive angle.
         let l = points.incidences[incidence];
-        let sign = if l.x * phi.cos() + l.y * phi.sin() > 1e-9 { -1.0 } else { 1.0 };
+        let sign = if l.x * phi.cos() + l.y * phi.sin() > 1e-9 {
+            -1.0
+        } else {
+            1.0
+        };
         let angle = |a: f64| if transmits { sign * a } else { PI - sign * a };
         data.extend(s.rows.iter().map(|&(a, i)| (angle(a), points.points[i].f)));
         if let Some(fit) = fit {
-            let mut line: Vec<(f64, f64)> = s.rows.iter().map(|&(a, i)| (angle(a), fit.fitted[i])).collect();
+            let mut line: Vec<(f64, f64)> = s
+                .rows
+                .iter()
+                .map(|&(a, i)| (angle(a), fit.fitted[i]))
+                .collect();
             line.sort_by(|a, b| a.0.total_cmp(&b.0));
             model.push(line);
         }
@@ -149,13 +193,22 @@ pub fn polar_plot(result: &FitResult, theta_deg: f64, phi: f64) -> String {
         .into_iter()
         .enumerate()
         .map(|(i, points)| Series {
-            name: if i == 0 { sheet.map_or(String::new(), |f| f.label.clone()) } else { String::new() },
+            name: if i == 0 {
+                sheet.map_or(String::new(), |f| f.label.clone())
+            } else {
+                String::new()
+            },
             color: COLORS[0],
             mark: Mark::Line,
             points,
         })
         .collect();
-    list.push(Series { name: "measured".into(), color: "#111", mark: Mark::Dots, points: data });
+    list.push(Series {
+        name: "measured".into(),
+        color: "#111",
+        mark: Mark::Dots,
+        points: data,
+    });
     let title = format!("incidence {found_deg:.0}°, plane φ = {:.0}°", degrees(phi));
     polar(&title, &list, found_deg.to_radians())
 }
@@ -165,12 +218,17 @@ fn nearest(points: &Points, theta_deg: f64, phi: f64) -> Option<usize> {
         let across = (p.x * -phi.sin() + p.y * phi.cos()).abs();
         (degrees(p.z.abs().min(1.0).acos()) - theta_deg).abs() + 200.0 * across
     };
-    (0..points.incidences.len()).min_by(|&a, &b| off(&points.incidences[a]).total_cmp(&off(&points.incidences[b])))
+    (0..points.incidences.len())
+        .min_by(|&a, &b| off(&points.incidences[a]).total_cmp(&off(&points.incidences[b])))
 }
 
 /// The models that the figures show: the best one, the sheet, and the best of other families, at most four.
 pub fn shown(result: &FitResult) -> Vec<&ModelFit> {
-    let mut out: Vec<&ModelFit> = result.ranking.iter().filter(|f| f.label == "sheet").collect();
+    let mut out: Vec<&ModelFit> = result
+        .ranking
+        .iter()
+        .filter(|f| f.label == "sheet")
+        .collect();
     for fit in &result.ranking {
         if out.len() < 4 && !out.iter().any(|o| o.model == fit.model) {
             out.push(fit);
@@ -181,15 +239,41 @@ pub fn shown(result: &FitResult) -> Vec<&ModelFit> {
 
 /// Straight-through transmittance over the angle of incidence, measured and fitted.
 pub fn gap_chart(points: &Points, fit: &ModelFit) -> String {
-    let rows: Vec<(usize, &Point)> = points.points.iter().enumerate().filter(|(_, p)| p.gap_density > 0.0).collect();
+    let rows: Vec<(usize, &Point)> = points
+        .points
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| p.gap_density > 0.0)
+        .collect();
     let of = |value: &dyn Fn(usize, &Point) -> f64| -> Vec<(f64, f64)> {
         rows.iter()
-            .map(|&(i, p)| (degrees(p.l.z.abs().min(1.0).acos()), value(i, p) / p.gap_density))
+            .map(|&(i, p)| {
+                (
+                    degrees(p.l.z.abs().min(1.0).acos()),
+                    value(i, p) / p.gap_density,
+                )
+            })
             .collect()
     };
     let list = [
-        Series { name: fit.label.clone(), color: COLORS[0], mark: Mark::Dots, points: of(&|i, _| fit.fitted[i]) },
-        Series { name: "measured".into(), color: "#111", mark: Mark::Dots, points: of(&|_, p| p.f) },
+        Series {
+            name: fit.label.clone(),
+            color: COLORS[0],
+            mark: Mark::Dots,
+            points: of(&|i, _| fit.fitted[i]),
+        },
+        Series {
+            name: "measured".into(),
+            color: "#111",
+            mark: Mark::Dots,
+            points: of(&|_, p| p.f),
+        },
     ];
-    chart("straight-through patch, all azimuths", "angle of incidence (°)", "transmitted share", &list, Scale::Linear)
+    chart(
+        "straight-through patch, all azimuths",
+        "angle of incidence (°)",
+        "transmitted share",
+        &list,
+        Scale::Linear,
+    )
 }

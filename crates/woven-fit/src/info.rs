@@ -68,12 +68,20 @@ pub fn parts(k: &Klems, block: &Block, i: usize) -> Parts {
     let peak = k.straight(block, i);
     let mut values: Vec<f64> = (0..n).map(|o| k.value(block, o, i)).collect();
     values.sort_by(f64::total_cmp);
-    let level = if n % 2 == 1 { values[n / 2] } else { 0.5 * (values[n / 2 - 1] + values[n / 2]) };
+    let level = if n % 2 == 1 {
+        values[n / 2]
+    } else {
+        0.5 * (values[n / 2 - 1] + values[n / 2])
+    };
     let skirt = (0..n)
         .filter(|&o| o != i)
         .map(|o| (k.value(block, o, i) - level).max(0.0) * k.patches[o].projected_solid_angle())
         .sum::<f64>();
-    Parts { peak, skirt, floor: k.directional(block, i) - peak - skirt }
+    Parts {
+        peak,
+        skirt,
+        floor: k.directional(block, i) - peak - skirt,
+    }
 }
 
 /// Looks at a measurement.
@@ -89,9 +97,16 @@ pub fn info(data: &Measurement) -> Info {
     };
     match &data.source {
         Source::Klems(k) => {
-            let kinds = [Kind::TransmissionFront, Kind::TransmissionBack, Kind::ReflectionFront, Kind::ReflectionBack];
+            let kinds = [
+                Kind::TransmissionFront,
+                Kind::TransmissionBack,
+                Kind::ReflectionFront,
+                Kind::ReflectionBack,
+            ];
             for kind in kinds {
-                let Some((_, block)) = data.block(kind) else { continue };
+                let Some((_, block)) = data.block(kind) else {
+                    continue;
+                };
                 out.values += block.values.len();
                 out.blocks.push(BlockInfo {
                     kind: kind.name(),
@@ -127,7 +142,15 @@ impl Info {
     /// The text for a terminal.
     pub fn to_text(&self) -> String {
         use std::fmt::Write;
-        let mut s = format!("{}{}\n", self.name, if self.maker.is_empty() { String::new() } else { format!(" ({})", self.maker) });
+        let mut s = format!(
+            "{}{}\n",
+            self.name,
+            if self.maker.is_empty() {
+                String::new()
+            } else {
+                format!(" ({})", self.maker)
+            }
+        );
         let ok = "a string grows";
         writeln!(s, "sha256 {}\n{} values", self.sha256, self.values).expect(ok);
         if let Some(band) = &self.band {
@@ -145,11 +168,19 @@ impl Info {
                 )
                 .expect(ok);
             }
-            writeln!(s, "  theta   total: mean    least  greatest   straight: mean").expect(ok);
+            writeln!(
+                s,
+                "  theta   total: mean    least  greatest   straight: mean"
+            )
+            .expect(ok);
             let mut rings: Vec<f64> = b.incidences.iter().map(|i| i.theta_deg).collect();
             rings.dedup();
             for theta in rings {
-                let ring: Vec<&Incidence> = b.incidences.iter().filter(|i| i.theta_deg == theta).collect();
+                let ring: Vec<&Incidence> = b
+                    .incidences
+                    .iter()
+                    .filter(|i| i.theta_deg == theta)
+                    .collect();
                 let n = ring.len() as f64;
                 let mean = |f: fn(&Incidence) -> f64| ring.iter().map(|i| f(i)).sum::<f64>() / n;
                 let least = ring.iter().map(|i| i.total).fold(f64::INFINITY, f64::min);

@@ -37,6 +37,9 @@ pub struct Point {
     pub sigma: Option<f64>,
     /// Projected solid angle of the kernel in sr, 0 if unknown.
     pub area: f64,
+    /// Its part of the measured light, relative to the mean of all points: patches of a matrix count by their projected
+    /// solid angles on both sides, so that crowded or grazing patches do not count double; 1 for scattered points.
+    pub share: f64,
     /// Which incidence it belongs to.
     pub incidence: usize,
     /// Whether light and viewer are on opposite sides.
@@ -94,7 +97,8 @@ impl Measurement {
             .extension()
             .map(|e| e.to_string_lossy().to_lowercase())
             .unwrap_or_default();
-        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes =
+            std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
         let sha256 = Sha256::digest(&bytes)
             .iter()
             .map(|b| format!("{b:02x}"))
@@ -106,7 +110,11 @@ impl Measurement {
         let (source, name, maker) = match extension.as_str() {
             "xml" => {
                 let klems = Klems::read(path)?;
-                let name = if klems.name.is_empty() { stem } else { klems.name.clone() };
+                let name = if klems.name.is_empty() {
+                    stem
+                } else {
+                    klems.name.clone()
+                };
                 let maker = klems.manufacturer.clone();
                 (Source::Klems(klems), name, maker)
             }
@@ -131,21 +139,28 @@ impl Measurement {
             path: PathBuf::from(format!("{name}.csv")),
             name: name.to_owned(),
             maker: String::new(),
-            sha256: Sha256::digest(scan.to_text()).iter().map(|b| format!("{b:02x}")).collect(),
+            sha256: Sha256::digest(scan.to_text())
+                .iter()
+                .map(|b| format!("{b:02x}"))
+                .collect(),
             source: Source::Scan(scan),
         }
     }
 
     /// The band of a Klems file that is fitted: Visible where there is one, else the first.
     pub fn band(&self) -> Option<&str> {
-        let Source::Klems(k) = &self.source else { return None };
+        let Source::Klems(k) = &self.source else {
+            return None;
+        };
         let visible = k.blocks.iter().find(|b| b.band == "Visible");
         visible.or(k.blocks.first()).map(|b| b.band.as_str())
     }
 
     /// The Klems block of a kind in the fitted band.
     pub fn block(&self, kind: Kind) -> Option<(&Klems, &Block)> {
-        let Source::Klems(k) = &self.source else { return None };
+        let Source::Klems(k) = &self.source else {
+            return None;
+        };
         k.block(self.band()?, kind).map(|b| (k, b))
     }
 
@@ -160,7 +175,9 @@ impl Measurement {
                     [Kind::ReflectionFront, Kind::ReflectionBack]
                 };
                 let block = kinds.iter().find_map(|&kind| self.block(kind));
-                block.map_or_else(Points::default, |(_, b)| klems_points(k, b, detail, normal_only))
+                block.map_or_else(Points::default, |(_, b)| {
+                    klems_points(k, b, detail, normal_only)
+                })
             }
             Source::Scan(scan) => scan_points(scan, transmission, normal_only),
         }
@@ -176,17 +193,21 @@ pub enum Detail {
     Full,
 }
 
-/// Point `i` of a rank-one lattice in four dimensions with `n` points (Korobov, generator 76 fits all n here).
-fn lattice(i: usize, n: usize) -> [f64; 4] {
-    // Golden-ratio family of order 4 (roots of x^5 = x + 1): low discrepancy for every n, no table.
-    const A: [f64; 4] = [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_809, 0.538_597_254_759_449];
-    let _ = n;
+/// Point `i` of a low-discrepancy sequence in four dimensions: multiples of the powers of the root of x⁵ = x + 1
+/// (the golden ratio's family), which needs no table and no fixed count.
+fn lattice(i: usize) -> [f64; 4] {
+    const A: [f64; 4] = [
+        0.856_674_883_854_503,
+        0.733_891_856_627_126,
+        0.628_706_721_037_809,
+        0.538_597_254_759_449,
+    ];
     A.map(|a| (0.5 + a * (i as f64 + 0.5)).fract())
 }
 
 /// Angle from straight through (or mirror) beyond which a lobe is smooth over a patch: fewer nodes do.
-const NEAR: f64 = 25.0;
-const MIDDLE: f64 = 50.0;
+const NEAR: f64 = 18.0;
+const MIDDLE: f64 = 35.0;
 
 fn klems_points(k: &Klems, block: &Block, detail: Detail, normal_only: bool) -> Points {
     let n = k.patches.len();
@@ -201,29 +222,40 @@ fn klems_points(k: &Klems, block: &Block, detail: Detail, normal_only: bool) -> 
             detail == Detail::Full || {
                 let theta = degrees(p.theta());
                 let phi = degrees(p.phi);
-                i == 0 || (theta < 55.0 && (theta / 10.0).round() as i64 % 2 == 0 && phi % 45.0 < 1e-6 && phi <= 180.0)
+                i == 0
+                    || (theta < 55.0
+                        && (theta / 10.0).round() as i64 % 2 == 0
+                        && phi % 45.0 < 1e-6
+                        && phi <= 180.0)
             }
         })
         .collect();
     for (index, &i) in used.iter().enumerate() {
         let incident = k.patches[i];
-        out.incidences.push(block.kind.l((incident.theta(), incident.phi)));
+        out.incidences
+            .push(block.kind.l((incident.theta(), incident.phi)));
         for o in 0..n {
             let outgoing = k.patches[o];
             let l = block.kind.l((incident.theta(), incident.phi));
             let v = block.kind.v((outgoing.theta(), outgoing.phi));
-            let mirrored = if block.kind.transmits() { -l } else { Vec3::new(-l.x, -l.y, l.z) };
+            let mirrored = if block.kind.transmits() {
+                -l
+            } else {
+                Vec3::new(-l.x, -l.y, l.z)
+            };
             let off = degrees(mirrored.dot(v).clamp(-1.0, 1.0).acos());
+            // Transmitted lobes are a few degrees narrow, reflected ones broad.
+            let finer = if block.kind.transmits() { 4 } else { 1 };
             let count = match (detail, off) {
-                (Detail::Full, a) if a < NEAR => 64,
-                (Detail::Full, a) if a < MIDDLE => 12,
-                (Detail::Full, _) => 4,
-                (Detail::Coarse, a) if a < NEAR => 16,
-                (Detail::Coarse, _) => 2,
+                (Detail::Full, a) if a < NEAR => 8 * finer,
+                (Detail::Full, a) if a < MIDDLE => 6,
+                (Detail::Full, _) => 2,
+                (Detail::Coarse, a) if a < NEAR => 2 * finer,
+                (Detail::Coarse, _) => 1,
             };
             let first = out.nodes.len();
             for s in 0..count {
-                let [a, b, c, d] = lattice(s, count);
+                let [a, b, c, d] = lattice(s);
                 out.nodes.push(Node {
                     l: block.kind.l(incident.at(a, b)),
                     v: block.kind.v(outgoing.at(c, d)),
@@ -237,14 +269,21 @@ fn klems_points(k: &Klems, block: &Block, detail: Detail, normal_only: bool) -> 
                 f: k.value(block, o, i),
                 sigma: None,
                 area,
+                share: area * incident.projected_solid_angle(),
                 incidence: index,
                 transmits: block.kind.transmits(),
-                gap_density: if block.kind.transmits() && i == o { 1.0 / area } else { 0.0 },
+                gap_density: if block.kind.transmits() && i == o {
+                    1.0 / area
+                } else {
+                    0.0
+                },
                 direct_only: false,
                 nodes: (first, out.nodes.len()),
             });
         }
     }
+    let mean = out.points.iter().map(|p| p.share).sum::<f64>() / out.points.len().max(1) as f64;
+    out.points.iter_mut().for_each(|p| p.share /= mean);
     out
 }
 
@@ -257,9 +296,17 @@ fn aperture(scan: &Scan) -> f64 {
 
 /// Centre and six directions at the radius that makes the average over a disc exact to third order.
 fn disc(v: Vec3<f64>, half_angle: f64) -> Vec<(Vec3<f64>, f64)> {
-    let side = if v.x.abs() < 0.9 { Vec3::new(1.0, 0.0, 0.0) } else { Vec3::new(0.0, 1.0, 0.0) };
+    let side = if v.x.abs() < 0.9 {
+        Vec3::new(1.0, 0.0, 0.0)
+    } else {
+        Vec3::new(0.0, 1.0, 0.0)
+    };
     let t = (side + v * -side.dot(v)).normalize();
-    let b = Vec3::new(v.y * t.z - v.z * t.y, v.z * t.x - v.x * t.z, v.x * t.y - v.y * t.x);
+    let b = Vec3::new(
+        v.y * t.z - v.z * t.y,
+        v.z * t.x - v.x * t.z,
+        v.x * t.y - v.y * t.x,
+    );
     // Seven-point rule: 1/4 in the centre, 1/8 at six places on the radius √(2/3) (Abramowitz and Stegun 25.4.61).
     let radius = half_angle * (2.0_f64 / 3.0).sqrt();
     let mut out = vec![(v, 0.25)];
@@ -276,7 +323,10 @@ fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) -> Points {
     let aperture = aperture(scan);
     let incidence = |out: &mut Points, l: Vec3<f64>| {
         // Directions that differ by less than a hundredth of a degree are one incidence.
-        let same = out.incidences.iter().position(|w| (*w + -l).length_sqr().sqrt() < 1.7e-4);
+        let same = out
+            .incidences
+            .iter()
+            .position(|w| (*w + -l).length_sqr().sqrt() < 1.7e-4);
         same.unwrap_or_else(|| {
             out.incidences.push(l);
             out.incidences.len() - 1
@@ -296,9 +346,18 @@ fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) -> Points {
         let index = incidence(&mut out, s.l);
         let first = out.nodes.len();
         if aperture > 0.0 {
-            out.nodes.extend(disc(s.v, aperture).into_iter().map(|(v, weight)| Node { l: s.l, v, weight }));
+            out.nodes
+                .extend(disc(s.v, aperture).into_iter().map(|(v, weight)| Node {
+                    l: s.l,
+                    v,
+                    weight,
+                }));
         } else {
-            out.nodes.push(Node { l: s.l, v: s.v, weight: 1.0 });
+            out.nodes.push(Node {
+                l: s.l,
+                v: s.v,
+                weight: 1.0,
+            });
         }
         let area = PI * aperture.sin().powi(2) * s.v.z.abs();
         let straight = aperture > 0.0 && transmits && (-s.l).dot(s.v) > aperture.cos();
@@ -308,6 +367,7 @@ fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) -> Points {
             f: s.f,
             sigma: s.sigma,
             area,
+            share: 1.0,
             incidence: index,
             transmits,
             gap_density: if straight { 1.0 / area } else { 0.0 },
@@ -322,13 +382,18 @@ fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) -> Points {
             }
             let index = incidence(&mut out, d.l);
             let first = out.nodes.len();
-            out.nodes.push(Node { l: d.l, v: -d.l, weight: 1.0 });
+            out.nodes.push(Node {
+                l: d.l,
+                v: -d.l,
+                weight: 1.0,
+            });
             out.points.push(Point {
                 l: d.l,
                 v: -d.l,
                 f: d.transmittance,
                 sigma: d.sigma,
                 area: 1.0,
+                share: 1.0,
                 incidence: index,
                 transmits: true,
                 gap_density: 1.0,

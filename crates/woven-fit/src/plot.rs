@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 /// Colours that people with any colour vision tell apart (Okabe and Ito 2008).
-pub const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f"];
+pub const COLORS: [&str; 7] = [
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f",
+];
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,17 +42,26 @@ const OK: &str = "a string grows";
 
 /// Text made safe inside SVG and HTML.
 pub fn escape(s: &str) -> String {
-    s.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    s.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 /// Ticks at 1, 2 or 5 times a power of ten, about `count` of them.
 fn ticks(lo: f64, hi: f64, count: f64) -> Vec<f64> {
     let raw = ((hi - lo) / count).max(1e-300);
     let power = 10f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|s| s * power).into_iter().find(|s| *s >= raw).unwrap_or(power);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|s| s * power)
+        .into_iter()
+        .find(|s| *s >= raw)
+        .unwrap_or(power);
     let first = (lo / step).ceil() as i64;
     let last = (hi / step).floor() as i64;
-    (first..=last.min(first + 50)).map(|i| i as f64 * step).collect()
+    (first..=last.min(first + 50))
+        .map(|i| i as f64 * step)
+        .collect()
 }
 
 fn label(x: f64) -> String {
@@ -66,20 +77,35 @@ fn label(x: f64) -> String {
 pub fn chart(title: &str, x_name: &str, y_name: &str, series: &[Series], scale: Scale) -> String {
     let (w, h, left, right, top, bottom) = (460.0, 300.0, 58.0, 10.0, 28.0, 42.0);
     let visible = |y: f64| y.is_finite() && (scale == Scale::Linear || y > 0.0);
-    let all: Vec<(f64, f64)> = series.iter().flat_map(|s| s.points.iter().copied()).filter(|p| visible(p.1)).collect();
+    let all: Vec<(f64, f64)> = series
+        .iter()
+        .flat_map(|s| s.points.iter().copied())
+        .filter(|p| visible(p.1))
+        .collect();
     let mut svg = open(w, h, title);
     if all.is_empty() {
         svg += "</svg>";
         return svg;
     }
-    let fold = |f: fn(f64, f64) -> f64, start: f64, get: fn(&(f64, f64)) -> f64| all.iter().map(get).fold(start, f);
-    let (x0, mut x1) = (fold(f64::min, f64::INFINITY, |p| p.0), fold(f64::max, f64::NEG_INFINITY, |p| p.0));
-    let (mut y0, mut y1) = (fold(f64::min, f64::INFINITY, |p| p.1), fold(f64::max, f64::NEG_INFINITY, |p| p.1));
+    let fold = |f: fn(f64, f64) -> f64, start: f64, get: fn(&(f64, f64)) -> f64| {
+        all.iter().map(get).fold(start, f)
+    };
+    let (x0, mut x1) = (
+        fold(f64::min, f64::INFINITY, |p| p.0),
+        fold(f64::max, f64::NEG_INFINITY, |p| p.0),
+    );
+    let (mut y0, mut y1) = (
+        fold(f64::min, f64::INFINITY, |p| p.1),
+        fold(f64::max, f64::NEG_INFINITY, |p| p.1),
+    );
     if x1 <= x0 {
         x1 = x0 + 1.0;
     }
     if scale == Scale::Log {
-        (y0, y1) = (y0.log10().floor().max(y1.log10().ceil() - 6.0), y1.log10().ceil());
+        (y0, y1) = (
+            y0.log10().floor().max(y1.log10().ceil() - 6.0),
+            y1.log10().ceil(),
+        );
         if y1 <= y0 {
             y1 = y0 + 1.0;
         }
@@ -114,7 +140,12 @@ pub fn chart(title: &str, x_name: &str, y_name: &str, series: &[Series], scale: 
     )
     .expect(OK);
     for s in series {
-        let points: Vec<(f64, f64)> = s.points.iter().filter(|p| visible(p.1)).map(|p| (x(p.0), y(p.1))).collect();
+        let points: Vec<(f64, f64)> = s
+            .points
+            .iter()
+            .filter(|p| visible(p.1))
+            .map(|p| (x(p.0), y(p.1)))
+            .collect();
         draw(&mut svg, s, &points);
     }
     legend(&mut svg, series, w - right - 6.0, top + 12.0);
@@ -135,7 +166,12 @@ fn draw(svg: &mut String, s: &Series, points: &[(f64, f64)]) {
     match s.mark {
         Mark::Dots => {
             for (x, y) in points {
-                write!(svg, "<circle cx='{x:.1}' cy='{y:.1}' r='2.6' fill='{}' fill-opacity='.85'/>", s.color).expect(OK);
+                write!(
+                    svg,
+                    "<circle cx='{x:.1}' cy='{y:.1}' r='2.6' fill='{}' fill-opacity='.85'/>",
+                    s.color
+                )
+                .expect(OK);
             }
         }
         Mark::Line if !points.is_empty() => {
@@ -143,7 +179,12 @@ fn draw(svg: &mut String, s: &Series, points: &[(f64, f64)]) {
             for (i, (x, y)) in points.iter().enumerate() {
                 write!(svg, "{}{x:.1} {y:.1}", if i > 0 { "L" } else { "" }).expect(OK);
             }
-            write!(svg, "' fill='none' stroke='{}' stroke-width='1.6'/>", s.color).expect(OK);
+            write!(
+                svg,
+                "' fill='none' stroke='{}' stroke-width='1.6'/>",
+                s.color
+            )
+            .expect(OK);
         }
         Mark::Line => {}
     }
@@ -152,7 +193,15 @@ fn draw(svg: &mut String, s: &Series, points: &[(f64, f64)]) {
 fn legend(svg: &mut String, series: &[Series], right: f64, top: f64) {
     for (i, s) in series.iter().filter(|s| !s.name.is_empty()).enumerate() {
         let y = top + 14.0 * i as f64;
-        write!(svg, "<text x='{:.1}' y='{y:.1}' class='e' style='fill:{}'>{} {}</text>", right, s.color, escape(&s.name), if s.mark == Mark::Dots { "●" } else { "—" }).expect(OK);
+        write!(
+            svg,
+            "<text x='{:.1}' y='{y:.1}' class='e' style='fill:{}'>{} {}</text>",
+            right,
+            s.color,
+            escape(&s.name),
+            if s.mark == Mark::Dots { "●" } else { "—" }
+        )
+        .expect(OK);
     }
 }
 
@@ -164,9 +213,18 @@ fn legend(svg: &mut String, series: &[Series], right: f64, top: f64) {
 pub fn polar(title: &str, series: &[Series], light_angle: f64) -> String {
     let (w, h, cx, cy, radius) = (420.0, 400.0, 210.0, 210.0, 168.0);
     let mut svg = open(w, h, title);
-    let values = || series.iter().flat_map(|s| s.points.iter().map(|p| p.1)).filter(|v| *v > 0.0 && v.is_finite());
+    let values = || {
+        series
+            .iter()
+            .flat_map(|s| s.points.iter().map(|p| p.1))
+            .filter(|v| *v > 0.0 && v.is_finite())
+    };
     let top = values().fold(f64::MIN_POSITIVE, f64::max).log10().ceil();
-    let low = values().fold(f64::INFINITY, f64::min).log10().floor().clamp(top - 5.0, top - 1.0);
+    let low = values()
+        .fold(f64::INFINITY, f64::min)
+        .log10()
+        .floor()
+        .clamp(top - 5.0, top - 1.0);
     let r = |f: f64| ((f.max(1e-300).log10() - low) / (top - low)).clamp(0.0, 1.0) * radius;
     let place = |angle: f64, f: f64| (cx + r(f) * angle.sin(), cy + r(f) * angle.cos());
     let mut decade = low;
@@ -179,10 +237,25 @@ pub fn polar(title: &str, series: &[Series], light_angle: f64) -> String {
     }
     for k in 0..12 {
         let a = f64::from(k) * std::f64::consts::PI / 6.0;
-        write!(svg, "<path d='M{cx} {cy}L{:.1} {:.1}' class='g'/>", cx + radius * a.sin(), cy + radius * a.cos()).expect(OK);
+        write!(
+            svg,
+            "<path d='M{cx} {cy}L{:.1} {:.1}' class='g'/>",
+            cx + radius * a.sin(),
+            cy + radius * a.cos()
+        )
+        .expect(OK);
     }
-    write!(svg, "<path d='M{} {cy}H{}' stroke='#333' stroke-width='2'/>", cx - radius, cx + radius).expect(OK);
-    let (ax, ay) = (cx - radius * light_angle.sin(), cy - radius * light_angle.cos());
+    write!(
+        svg,
+        "<path d='M{} {cy}H{}' stroke='#333' stroke-width='2'/>",
+        cx - radius,
+        cx + radius
+    )
+    .expect(OK);
+    let (ax, ay) = (
+        cx - radius * light_angle.sin(),
+        cy - radius * light_angle.cos(),
+    );
     write!(
         svg,
         "<path d='M{ax:.1} {ay:.1}L{:.1} {:.1}' stroke='#e6a000' stroke-width='2.5'/><circle cx='{ax:.1}' cy='{ay:.1}' r='5' fill='#e6a000'/>",
@@ -209,15 +282,30 @@ pub fn correlations(names: &[&str], values: &[Option<f64>]) -> String {
     for (i, name) in names.iter().enumerate() {
         let y = top + cell * (i as f64 + 0.5) + 4.0;
         let x = left + cell * (i as f64 + 0.5);
-        write!(svg, "<text x='{:.1}' y='{y:.1}' class='e'>{}</text>", left - 6.0, escape(name)).expect(OK);
+        write!(
+            svg,
+            "<text x='{:.1}' y='{y:.1}' class='e'>{}</text>",
+            left - 6.0,
+            escape(name)
+        )
+        .expect(OK);
         let foot = top + cell * n as f64 + 10.0;
-        write!(svg, "<text transform='translate({x:.1} {foot:.1}) rotate(30)'>{}</text>", escape(name)).expect(OK);
+        write!(
+            svg,
+            "<text transform='translate({x:.1} {foot:.1}) rotate(30)'>{}</text>",
+            escape(name)
+        )
+        .expect(OK);
         for j in 0..n {
             let (x, y) = (left + cell * j as f64, top + cell * i as f64);
             let (fill, text) = match values.get(i * n + j).copied().flatten() {
                 Some(c) => {
                     let fade = (255.0 * (1.0 - c.abs())) as u8;
-                    let fill = if c > 0.0 { format!("rgb(255,{fade},{fade})") } else { format!("rgb({fade},{fade},255)") };
+                    let fill = if c > 0.0 {
+                        format!("rgb(255,{fade},{fade})")
+                    } else {
+                        format!("rgb({fade},{fade},255)")
+                    };
                     (fill, format!("{c:.2}"))
                 }
                 None => ("#eee".to_owned(), "·".to_owned()),
@@ -253,7 +341,11 @@ mod tests {
             chart("t", "x", "y", std::slice::from_ref(&s), Scale::Log),
             chart("t", "x", "y", std::slice::from_ref(&s), Scale::Linear),
         ] {
-            assert_eq!(svg.matches("<circle").count(), 2, "the NaN is left out, the others are there");
+            assert_eq!(
+                svg.matches("<circle").count(),
+                2,
+                "the NaN is left out, the others are there"
+            );
             assert!(svg.contains("a &lt; b") && !svg.contains("NaN") && svg.ends_with("</svg>"));
         }
         assert!(!polar("p", &[s], 0.3).contains("NaN"));

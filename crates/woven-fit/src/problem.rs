@@ -154,7 +154,12 @@ impl Spec {
 
     /// The parameters of `sheet` that reflection sees, on top of known `values` for all others.
     pub fn reflection(model: &'static ModelInfo, values: &[f64]) -> Self {
-        let mut spec = Self::with(model, |name| !REFLECTION.contains(&name), true);
+        // f0 multiplies k_r at all angles but grazing ones, so it keeps the value of a common fibre.
+        let mut spec = Self::with(
+            model,
+            |name| !REFLECTION.contains(&name) || name == "f0",
+            true,
+        );
         let (linear, _) = model.split(values);
         spec.fixed_linear = linear;
         spec.shape = model
@@ -207,8 +212,12 @@ impl Spec {
                 .iter()
                 .position(|c| c.name.ends_with(suffix) && matches!(c.place, Place::Shape(_)))
         };
-        let (x, y) = find("_x").zip(find("_y")).or_else(|| find("_u").zip(find("_v")))?;
-        let (Place::Shape(i), Place::Shape(j)) = (self.coordinates[x].place, self.coordinates[y].place) else {
+        let (x, y) = find("_x")
+            .zip(find("_y"))
+            .or_else(|| find("_u").zip(find("_v")))?;
+        let (Place::Shape(i), Place::Shape(j)) =
+            (self.coordinates[x].place, self.coordinates[y].place)
+        else {
             return None;
         };
         let mut spec = self.clone();
@@ -222,7 +231,9 @@ impl Spec {
     pub fn names(&self) -> Vec<&'static str> {
         let linear: Vec<&'static str> = self.model.linear().map(|p| p.name).collect();
         let factors = self.linear.iter().map(|&i| linear[i]);
-        factors.chain(self.coordinates.iter().map(|c| c.name)).collect()
+        factors
+            .chain(self.coordinates.iter().map(|c| c.name))
+            .collect()
     }
 
     /// Shape values and gap values for solver coordinates `x`.
@@ -266,10 +277,29 @@ impl Spec {
             .collect()
     }
 
+    /// Factors that are not free and not zero: (number, value).
+    fn held(&self) -> Vec<(usize, f64)> {
+        let held = self.fixed_linear.iter().copied().enumerate();
+        held.filter(|(i, k)| *k != 0.0 && !self.linear.contains(i))
+            .collect()
+    }
+
+    /// Holds the factor `name` at `value`.
+    pub fn hold(&mut self, name: &str, value: f64) {
+        if let Some(i) = self.model.linear().position(|p| p.name == name) {
+            self.linear.retain(|&j| j != i);
+            self.fixed_linear[i] = value;
+        }
+    }
+
     /// The solver's range of coordinate `c`.
     pub fn range(&self, c: usize) -> (f64, f64) {
         let c = &self.coordinates[c];
-        if c.log { (c.min.ln(), c.max.ln()) } else { (c.min, c.max) }
+        if c.log {
+            (c.min.ln(), c.max.ln())
+        } else {
+            (c.min, c.max)
+        }
     }
 }
 
@@ -307,12 +337,19 @@ impl Evaluator<'_> {
 
     /// Fills the table at solver coordinates `x`; false if any number is not finite.
     pub fn fill(&self, x: &[f64], slopes: bool, table: &mut Table) -> bool {
-        let (m, j, s) = (self.m(), self.spec.linear.len(), self.spec.coordinates.len());
+        let (m, j, s) = (
+            self.m(),
+            self.spec.linear.len(),
+            self.spec.coordinates.len(),
+        );
         let stride = if slopes { (j + 1) * (s + 1) } else { j + 1 };
         let mut rows = vec![0.0; m * stride];
         let (shape, gap) = self.spec.shape_at(x);
         let work = |first: usize, out: &mut [f64], row: &dyn Fn(&Point, &mut [f64])| {
-            for (p, out) in self.points.points[first..].iter().zip(out.chunks_exact_mut(stride)) {
+            for (p, out) in self.points.points[first..]
+                .iter()
+                .zip(out.chunks_exact_mut(stride))
+            {
                 row(p, out);
             }
         };
@@ -360,15 +397,23 @@ impl Evaluator<'_> {
         let spec = self.spec;
         let own = spec.model.name == "sheet";
         let n = spec.linear.len();
+        let held = spec.held();
         for node in &self.points.nodes[p.nodes.0..p.nodes.1] {
             if !p.direct_only {
                 let b = (spec.model.f64.basis)(shape, node.l, node.v);
                 for (o, &i) in out.iter_mut().zip(&spec.linear) {
                     *o += node.weight * b[i];
                 }
+                for &(i, k) in &held {
+                    out[n] += node.weight * k * b[i];
+                }
             }
             if spec.gap && p.gap_density > 0.0 {
-                let [a, b, c] = if own { [shape[0], shape[1], shape[2]] } else { *gap };
+                let [a, b, c] = if own {
+                    [shape[0], shape[1], shape[2]]
+                } else {
+                    *gap
+                };
                 out[n] += node.weight * p.gap_density * weave::openness(a, b, c, node.l);
             }
         }
@@ -379,9 +424,14 @@ impl Evaluator<'_> {
         let spec = self.spec;
         let own = spec.model.name == "sheet";
         let n = spec.linear.len();
-        let zero = Dual { v: 0.0, d: [0.0; 8] };
+        let zero = Dual {
+            v: 0.0,
+            d: [0.0; 8],
+        };
         let mut sums = [zero; MAX_LINEAR];
         let mut through = zero;
+        let mut fixed = zero;
+        let held = spec.held();
         for node in &self.points.nodes[p.nodes.0..p.nodes.1] {
             let (l, v): (Vec3<D8>, Vec3<D8>) = (node.l.cast(), node.v.cast());
             if !p.direct_only {
@@ -389,10 +439,21 @@ impl Evaluator<'_> {
                 for (sum, &i) in sums.iter_mut().zip(&spec.linear) {
                     add(sum, &b[i], node.weight);
                 }
+                for &(i, k) in &held {
+                    add(&mut fixed, &b[i], node.weight * k);
+                }
             }
             if spec.gap && p.gap_density > 0.0 {
-                let [a, b, c] = if own { [shape[0], shape[1], shape[2]] } else { *gap };
-                add(&mut through, &weave::openness(a, b, c, l), node.weight * p.gap_density);
+                let [a, b, c] = if own {
+                    [shape[0], shape[1], shape[2]]
+                } else {
+                    *gap
+                };
+                add(
+                    &mut through,
+                    &weave::openness(a, b, c, l),
+                    node.weight * p.gap_density,
+                );
             }
         }
         let slope = |d: &D8, c: &Coordinate, x: f64, of_gap: bool| {
@@ -407,13 +468,13 @@ impl Evaluator<'_> {
         for (k, sum) in sums[..n].iter().enumerate() {
             out[k] = sum.v;
         }
-        out[n] = through.v;
+        out[n] = through.v + fixed.v;
         for (s, (c, &x)) in spec.coordinates.iter().zip(x).enumerate() {
             let block = &mut out[(s + 1) * (n + 1)..(s + 2) * (n + 1)];
             for (o, sum) in block.iter_mut().zip(&sums[..n]) {
                 *o = slope(sum, c, x, false);
             }
-            block[n] = slope(&through, c, x, true);
+            block[n] = slope(&through, c, x, true) + slope(&fixed, c, x, false);
         }
     }
 
@@ -524,7 +585,9 @@ impl Residuals for Separable<'_> {
         let (k, passive) = nnls_triangular(&triangle, n, &target);
         let set: Vec<usize> = (0..n).filter(|&j| passive[j]).collect();
         for &j in &set {
-            r.iter_mut().zip(columns[j]).for_each(|(r, c)| *r += k[j] * c);
+            r.iter_mut()
+                .zip(columns[j])
+                .for_each(|(r, c)| *r += k[j] * c);
         }
         self.k = k;
         let Some(jac) = jac else { return true };
@@ -589,7 +652,11 @@ impl Residuals for Joint<'_> {
     }
     fn bounds(&self, j: usize) -> (f64, f64) {
         let n = self.eval.spec.linear.len();
-        if j < n { (0.0, f64::INFINITY) } else { self.eval.spec.range(j - n) }
+        if j < n {
+            (0.0, f64::INFINITY)
+        } else {
+            self.eval.spec.range(j - n)
+        }
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64], jac: Option<&mut [f64]>) -> bool {

@@ -20,17 +20,30 @@ impl FitResult {
         let reflection = self.reflection.as_ref();
         // The reflection was fitted on top of the transmission's values, so its list holds all of them.
         let values = &reflection.unwrap_or(fit).values;
-        let named = |name: &str| info.params.iter().position(|p| p.name == name).map_or(0.0, |i| values[i]);
+        let named = |name: &str| {
+            info.params
+                .iter()
+                .position(|p| p.name == name)
+                .map_or(0.0, |i| values[i])
+        };
         let (through, back) = (named("t_d") + named("k_t"), named("r_d") + named("k_r"));
         // The yarn cannot give more than it gets.
-        let scale = if through + back > 1.0 { ((1.0 - through) / back).clamp(0.0, 1.0) } else { 1.0 };
+        let scale = if through + back > 1.0 {
+            ((1.0 - through) / back).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
         let mut parameters = BTreeMap::new();
         for (p, &value) in info.params.iter().zip(values) {
             let reflects = ["r_d", "k_r"].contains(&p.name);
             if reflects && reflection.is_none() {
                 continue;
             }
-            let value = if reflects { value * scale * (1.0 - 1e-9) } else { value };
+            let value = if reflects {
+                value * scale * (1.0 - 1e-9)
+            } else {
+                value
+            };
             parameters.insert(p.name.to_owned(), value.clamp(p.min, p.max));
         }
         let mut provenance = BTreeMap::new();
@@ -44,17 +57,27 @@ impl FitResult {
                 "transmission: RMS {:.1}e-4 of the peak over {} values{}",
                 fit.rms_e4,
                 fit.points,
-                reflection.map_or("; reflection not measured".to_owned(), |r| format!("; reflection: RMS {:.1}e-4 of its peak", r.rms_e4))
+                reflection.map_or("; reflection not measured".to_owned(), |r| format!(
+                    "; reflection: RMS {:.1}e-4 of its peak",
+                    r.rms_e4
+                ))
             ),
         );
         if scale < 1.0 {
-            provenance.insert("remark".to_owned(), format!("reflection scaled by {scale:.4} so that no light is made"));
+            provenance.insert(
+                "remark".to_owned(),
+                format!("reflection scaled by {scale:.4} so that no light is made"),
+            );
         }
         Some(Fabric {
             name: self.name.clone(),
             maker: self.maker.clone(),
             weave: None,
-            optics: OpticsTable { model: fit.model.to_owned(), parameters, colors: BTreeMap::new() },
+            optics: OpticsTable {
+                model: fit.model.to_owned(),
+                parameters,
+                colors: BTreeMap::new(),
+            },
             mechanics: BTreeMap::new(),
             provenance,
         })
@@ -79,7 +102,11 @@ pub fn html(result: &FitResult, command: &str) -> String {
         escape(&result.name)
     )
     .expect(ok);
-    let maker = if result.maker.is_empty() { String::new() } else { format!("{} · ", escape(&result.maker)) };
+    let maker = if result.maker.is_empty() {
+        String::new()
+    } else {
+        format!("{} · ", escape(&result.maker))
+    };
     writeln!(
         s,
         "<p>{maker}{} transmission values, {} reflection values, {} incidences · <code>{}</code> · sha256 <code>{}</code><br><code>{}</code></p>",
@@ -100,9 +127,21 @@ pub fn html(result: &FitResult, command: &str) -> String {
     writeln!(s, "<h2>Measurement and models</h2><p>Curves are the models averaged over the instrument's patches, as they were compared.</p>").expect(ok);
     let models = shown(result);
     let points = &result.transmission_points;
-    writeln!(s, "<div class='row'>{}{}</div>", polar_plot(result, 0.0, 0.0), polar_plot(result, 0.0, PI / 2.0)).expect(ok);
+    writeln!(
+        s,
+        "<div class='row'>{}{}</div>",
+        polar_plot(result, 0.0, 0.0),
+        polar_plot(result, 0.0, PI / 2.0)
+    )
+    .expect(ok);
     if points.incidences.len() > 1 {
-        writeln!(s, "<div class='row'>{}{}</div>", polar_plot(result, 40.0, 0.0), polar_plot(result, 40.0, PI / 2.0)).expect(ok);
+        writeln!(
+            s,
+            "<div class='row'>{}{}</div>",
+            polar_plot(result, 40.0, 0.0),
+            polar_plot(result, 40.0, PI / 2.0)
+        )
+        .expect(ok);
     }
     let slices = slices(points);
     for slice in &slices {
@@ -118,7 +157,11 @@ pub fn html(result: &FitResult, command: &str) -> String {
     for slice in slices.iter().take(4) {
         s += &residual_chart(points, slice, &models);
     }
-    if let Some(fit) = result.ranking.iter().find(|f| f.has_gap && f.label == "sheet") {
+    if let Some(fit) = result
+        .ranking
+        .iter()
+        .find(|f| f.has_gap && f.label == "sheet")
+    {
         s += &gap_chart(points, fit);
     }
     s += "</div>";
@@ -144,7 +187,12 @@ pub fn html(result: &FitResult, command: &str) -> String {
 fn straight(s: &mut String, result: &FitResult) {
     let Some(st) = &result.straight else { return };
     let ok = "a string grows";
-    writeln!(s, "<h2>Straight-through light</h2><p class='big'>{}</p>", escape(&text::straight(result))).expect(ok);
+    writeln!(
+        s,
+        "<h2>Straight-through light</h2><p class='big'>{}</p>",
+        escape(&text::straight(result))
+    )
+    .expect(ok);
     if let Some(share) = st.measured_share {
         let percent = 100.0 * share;
         writeln!(
@@ -160,19 +208,24 @@ fn ranking(s: &mut String, result: &FitResult) {
     let ok = "a string grows";
     writeln!(
         s,
-        "<h2>Ranking</h2><table><tr><th>place<th class='l'>model<th>n<th>SSE·10⁴<th>RMS·10⁴<th>RMS·10⁴ off the peak<th>AICc<th>BIC<th>CV·10⁴<th>keeps place<th class='l'>end</tr>"
+        "<h2>Ranking</h2><table><tr><th>place<th class='l'>model<th>n<th>misfit<th>SSE·10⁴<th>RMS·10⁴<th>RMS·10⁴ off the peak<th>AICc<th>BIC<th>CV·10⁴<th>keeps place<th class='l'>end</tr>"
     )
     .expect(ok);
     let mut last = 0;
     for fit in &result.ranking {
-        let place = if fit.place == last { "=".to_owned() } else { fit.place.to_string() };
+        let place = if fit.place == last {
+            "=".to_owned()
+        } else {
+            fit.place.to_string()
+        };
         last = fit.place;
         writeln!(
             s,
-            "<tr{}><td>{place}<td class='l'>{}<td>{}<td>{:.1}<td>{:.1}<td>{:.1}<td>{:.1}<td>{:.1}<td>{}<td>{:.0} %<td class='l'>{}</tr>",
+            "<tr{}><td>{place}<td class='l'>{}<td>{}<td>{:.0}<td>{:.1}<td>{:.1}<td>{:.1}<td>{:.1}<td>{:.1}<td>{}<td>{:.0} %<td class='l'>{}</tr>",
             if fit.place == 1 { " class='best'" } else { "" },
             escape(&fit.label),
             fit.uncertainty.rank,
+            fit.misfit,
             fit.sse_e4,
             fit.rms_e4,
             fit.rms_off_peak_e4,
@@ -184,7 +237,7 @@ fn ranking(s: &mut String, result: &FitResult) {
         )
         .expect(ok);
     }
-    s.push_str("</table><p>n counts what the data can see; \"=\" ties with the line above.</p>");
+    s.push_str("</table><p>Sorted by misfit: squares in units of the best model's scatter, apart for straight-through patches and the rest. n counts what the data can see; \"=\" ties with the line above.</p>");
 }
 
 fn parameters(s: &mut String, fit: &ModelFit, open: bool) {
@@ -203,12 +256,31 @@ fn parameters(s: &mut String, fit: &ModelFit, open: bool) {
     )
     .expect(ok);
     for p in &fit.parameters {
-        let interval = p.interval95.map_or(String::new(), |(lo, hi)| format!("{} … {}", text::number(lo), text::number(hi)));
-        writeln!(s, "<tr><td class='l'>{}<td>{}<td>{interval}<td class='l'>{}</tr>", p.name, escape(&text::with_error(p)), escape(&p.remark)).expect(ok);
+        let interval = p.interval95.map_or(String::new(), |(lo, hi)| {
+            format!("{} … {}", text::number(lo), text::number(hi))
+        });
+        writeln!(
+            s,
+            "<tr><td class='l'>{}<td>{}<td>{interval}<td class='l'>{}</tr>",
+            p.name,
+            escape(&text::with_error(p)),
+            escape(&p.remark)
+        )
+        .expect(ok);
     }
     s.push_str("</table><ul>");
-    for line in fit.uncertainty.invisible.iter().chain(&fit.uncertainty.entangled) {
+    for line in fit
+        .uncertainty
+        .invisible
+        .iter()
+        .chain(&fit.uncertainty.entangled)
+    {
         writeln!(s, "<li>{}", escape(line)).expect(ok);
     }
-    writeln!(s, "</ul></div>{}</div></details>", correlations(&fit.names, &fit.uncertainty.correlation)).expect(ok);
+    writeln!(
+        s,
+        "</ul></div>{}</div></details>",
+        correlations(&fit.names, &fit.uncertainty.correlation)
+    )
+    .expect(ok);
 }

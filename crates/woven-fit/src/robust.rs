@@ -21,7 +21,11 @@ impl Loss {
         if self == Loss::Squares {
             return;
         }
-        let weighted: Vec<f64> = weights.iter().zip(misfit).map(|(w, r)| (w * r).abs()).collect();
+        let weighted: Vec<f64> = weights
+            .iter()
+            .zip(misfit)
+            .map(|(w, r)| (w * r).abs())
+            .collect();
         let mut sorted = weighted.clone();
         sorted.sort_by(f64::total_cmp);
         // The median of |r| of a normal distribution is 0.6745 standard deviations.

@@ -98,7 +98,11 @@ pub struct Solution {
 }
 
 /// Minimises from `start` (moved into the bounds first).
-pub fn solve<P: Residuals + ?Sized>(problem: &mut P, start: &[f64], settings: &Settings) -> Solution {
+pub fn solve<P: Residuals + ?Sized>(
+    problem: &mut P,
+    start: &[f64],
+    settings: &Settings,
+) -> Solution {
     let mut state = State::new(problem, start);
     let outcome = state.descend(problem, settings);
     state.finish(problem, outcome, settings)
@@ -179,11 +183,19 @@ impl State {
     }
 
     fn scale_of(&self, j: usize) -> f64 {
-        if self.scale[j] > 0.0 { self.scale[j] } else { 1.0 }
+        if self.scale[j] > 0.0 {
+            self.scale[j]
+        } else {
+            1.0
+        }
     }
 
     fn scaled_norm(&self, v: &[f64]) -> f64 {
-        norm(&(0..self.n).map(|j| self.scale_of(j) * v[j]).collect::<Vec<_>>())
+        norm(
+            &(0..self.n)
+                .map(|j| self.scale_of(j) * v[j])
+                .collect::<Vec<_>>(),
+        )
     }
 
     /// Indices that may move: not at a bound with the gradient pointing out.
@@ -281,7 +293,8 @@ impl State {
             }
             let qr = self.triangle_of(&free, &self.z);
             // Share of the residual that a Gauss–Newton step could explain.
-            if norm(&qr.qtb) <= settings.offset_tol * self.fnorm && qr.rank(RANK_TOL) == free.len() {
+            if norm(&qr.qtb) <= settings.offset_tol * self.fnorm && qr.rank(RANK_TOL) == free.len()
+            {
                 return Outcome::Converged;
             }
             loop {
@@ -292,7 +305,11 @@ impl State {
                 let length = self.scaled_norm(&p);
                 let predicted = self.predicted(&p);
                 let trial: Vec<f64> = (0..self.n)
-                    .map(|j| (self.x[j] + p[j]).max(self.bounds[j].0).min(self.bounds[j].1))
+                    .map(|j| {
+                        (self.x[j] + p[j])
+                            .max(self.bounds[j].0)
+                            .min(self.bounds[j].1)
+                    })
                     .collect();
                 let ok = problem.evaluate(&trial, &mut trial_r, None);
                 self.evaluations += 1;
@@ -302,7 +319,11 @@ impl State {
                 } else {
                     f64::NEG_INFINITY
                 };
-                let ratio = if predicted > 0.0 { gain / predicted } else { -1.0 };
+                let ratio = if predicted > 0.0 {
+                    gain / predicted
+                } else {
+                    -1.0
+                };
                 if ratio <= 0.25 {
                     // MINPACK: the minimum of the parabola through both values and the slope.
                     let shrink = if gain >= 0.0 {
@@ -368,7 +389,11 @@ impl State {
             self.evaluations += 1;
             let fnorm = norm(&r);
             // Near the minimum the sum of squares is flat: rounding may raise it a little.
-            if !ok || fnorm.is_nan() || fnorm > self.fnorm * (1.0 + 1e-7) || jac.iter().any(|v| !v.is_finite()) {
+            if !ok
+                || fnorm.is_nan()
+                || fnorm > self.fnorm * (1.0 + 1e-7)
+                || jac.iter().any(|v| !v.is_finite())
+            {
                 return;
             }
             last = length;
@@ -380,7 +405,12 @@ impl State {
         }
     }
 
-    fn finish<P: Residuals + ?Sized>(mut self, problem: &mut P, outcome: Outcome, settings: &Settings) -> Solution {
+    fn finish<P: Residuals + ?Sized>(
+        mut self,
+        problem: &mut P,
+        outcome: Outcome,
+        settings: &Settings,
+    ) -> Solution {
         let mut outcome = outcome;
         let mut at_bound = vec![false; self.n];
         if self.finite {
@@ -430,7 +460,9 @@ fn trust_region_step(qr: &PivotedR, delta: f64) -> (Vec<f64>, bool) {
         }
     }
     // g = Rᵀ qtb; |g| / delta bounds the multiplier from above.
-    let g: Vec<f64> = (0..n).map(|j| dot(&qr.r[j * n..=j * n + j], &qr.qtb[..=j])).collect();
+    let g: Vec<f64> = (0..n)
+        .map(|j| dot(&qr.r[j * n..=j * n + j], &qr.qtb[..=j]))
+        .collect();
     let g_length = norm(&g);
     if g_length == 0.0 {
         return (vec![0.0; n], false);

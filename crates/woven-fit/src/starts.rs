@@ -70,7 +70,9 @@ pub fn sobol(count: usize, dimensions: usize, seed: u64) -> Vec<Vec<f64>> {
                 .iter()
                 .enumerate()
                 .map(|(d, v)| {
-                    let bits = (0..32).filter(|b| (gray >> b) & 1 == 1).fold(0, |x, b| x ^ v[b]);
+                    let bits = (0..32)
+                        .filter(|b| (gray >> b) & 1 == 1)
+                        .fold(0, |x, b| x ^ v[b]);
                     let shifted = bits ^ (hash(seed, d as u64) >> 32) as u32;
                     (f64::from(shifted) + 0.5) / 4_294_967_296.0
                 })

@@ -23,7 +23,15 @@ pub fn number(x: f64) -> String {
 /// "0.1234 ± 0.0012", with the error to two digits and the value to the same decimal; without error bar, the reason.
 pub fn with_error(p: &Parameter) -> String {
     let Some(se) = p.standard_error.filter(|s| s.is_finite() && *s > 0.0) else {
-        return format!("{} ({})", number(p.value), if p.remark.is_empty() { "no error bar" } else { &p.remark });
+        return format!(
+            "{} ({})",
+            number(p.value),
+            if p.remark.is_empty() {
+                "no error bar"
+            } else {
+                &p.remark
+            }
+        );
     };
     let decimals = (1.0 - se.log10().floor()).clamp(0.0, 12.0) as usize;
     format!("{:.decimals$} ± {:.decimals$}", p.value, se)
@@ -35,8 +43,18 @@ pub fn ranking(result: &FitResult) -> String {
     let ok = "a string grows";
     writeln!(
         s,
-        "{:>5}  {:<34} {:>2} {:>10} {:>8} {:>8} {:>11} {:>11} {:>8} {:>6}",
-        "place", "model", "n", "SSE·1e4", "RMS·1e4", "off peak", "AICc", "BIC", "CV·1e4", "keeps"
+        "{:>5}  {:<34} {:>2} {:>9} {:>10} {:>8} {:>8} {:>11} {:>11} {:>8} {:>6}",
+        "place",
+        "model",
+        "n",
+        "misfit",
+        "SSE·1e4",
+        "RMS·1e4",
+        "off peak",
+        "AICc",
+        "BIC",
+        "CV·1e4",
+        "keeps"
     )
     .expect(ok);
     let mut last = 0;
@@ -45,10 +63,11 @@ pub fn ranking(result: &FitResult) -> String {
         last = fit.place;
         writeln!(
             s,
-            "{:>5}  {:<34} {:>2} {:>10.1} {:>8.1} {:>8.1} {:>11.1} {:>11.1} {:>8} {:>5.0}%{}",
+            "{:>5}  {:<34} {:>2} {:>9.0} {:>10.1} {:>8.1} {:>8.1} {:>11.1} {:>11.1} {:>8} {:>5.0}%{}",
             if tie { "=".to_owned() } else { fit.place.to_string() },
             fit.label,
             fit.uncertainty.rank,
+            fit.misfit,
             fit.sse_e4,
             fit.rms_e4,
             fit.rms_off_peak_e4,
@@ -62,7 +81,7 @@ pub fn ranking(result: &FitResult) -> String {
     }
     writeln!(
         s,
-        "\nSSE and RMS of values divided by the peak; metric {}; \"=\" ties with the line above; \"keeps\": share of bootstrap samples at this place or better.",
+        "\nSorted by misfit: squares ({} metric) in units of the best model's scatter, apart for straight-through rows and the rest.\nSSE and RMS of values divided by the peak; \"=\" ties with the line above; \"keeps\": share of bootstrap samples at this place or better.",
         result.metric.name()
     )
     .expect(ok);
@@ -71,15 +90,28 @@ pub fn ranking(result: &FitResult) -> String {
 
 /// One model's parameters with error bars, and what the data cannot see.
 pub fn parameters(fit: &ModelFit) -> String {
-    let mut s = format!("{} ({}, {} of {} starts agree)\n", fit.label, fit.outcome, fit.starts_agreeing, fit.starts);
+    let mut s = format!(
+        "{} ({}, {} of {} starts agree)\n",
+        fit.label, fit.outcome, fit.starts_agreeing, fit.starts
+    );
     let ok = "a string grows";
     for p in &fit.parameters {
         writeln!(s, "    {:<11} {}", p.name, with_error(p)).expect(ok);
     }
     if fit.uncertainty.rank < fit.uncertainty.free {
-        writeln!(s, "    rank {} of {} free parameters", fit.uncertainty.rank, fit.uncertainty.free).expect(ok);
+        writeln!(
+            s,
+            "    rank {} of {} free parameters",
+            fit.uncertainty.rank, fit.uncertainty.free
+        )
+        .expect(ok);
     }
-    for line in fit.uncertainty.invisible.iter().chain(&fit.uncertainty.entangled) {
+    for line in fit
+        .uncertainty
+        .invisible
+        .iter()
+        .chain(&fit.uncertainty.entangled)
+    {
         writeln!(s, "    {line}").expect(ok);
     }
     s
@@ -87,23 +119,44 @@ pub fn parameters(fit: &ModelFit) -> String {
 
 /// Straight-through share in words.
 pub fn straight(result: &FitResult) -> String {
-    let Some(st) = &result.straight else { return String::new() };
-    let mut s = format!("straight-through light at {:.0}° incidence: {:.4}", st.theta_deg, st.measured);
-    if let (Some(t), Some(share)) = (st.transmittance, st.measured_share) {
-        s += &format!(" of {t:.4} transmitted: {:.1} % measured", 100.0 * share);
-    }
-    if let Some(share) = st.model_share {
-        s += &format!(", {:.1} % in the fitted sheet", 100.0 * share);
-    }
+    let Some(st) = &result.straight else {
+        return String::new();
+    };
+    let at = if st.theta_deg < 0.5 {
+        "normal incidence".to_owned()
+    } else {
+        format!("{:.0}° incidence", st.theta_deg)
+    };
+    let mut s = match (st.transmittance, st.measured_share) {
+        (Some(t), Some(share)) => {
+            format!(
+                "straight-through share at {at}: {:.1} % of the transmittance ({:.4} of {t:.4} measured)",
+                100.0 * share,
+                st.measured
+            )
+        }
+        _ => format!(
+            "straight-through light at {at}: {:.4} measured",
+            st.measured
+        ),
+    };
     if let Some(openness) = st.openness {
-        s += &format!(" (openness {openness:.4})");
+        s += &format!("; fitted sheet: openness {openness:.4}");
+        if let Some(share) = st.model_share {
+            s += &format!(", {:.1} % of its transmittance", 100.0 * share);
+        }
     }
     s
 }
 
 /// The whole answer for a terminal: ranking, straight-through share, parameters of the sheet and of the best model, notes.
 pub fn whole(result: &FitResult) -> String {
-    let mut s = format!("{}: {} transmission values, {} incidences\n\n", result.name, result.transmission_points.points.len(), result.transmission_points.incidences.len());
+    let mut s = format!(
+        "{}: {} transmission values, {} incidences\n\n",
+        result.name,
+        result.transmission_points.points.len(),
+        result.transmission_points.incidences.len()
+    );
     s += &ranking(result);
     s += &format!("\n{}\n\n", straight(result));
     for (i, fit) in result.ranking.iter().enumerate() {

@@ -38,7 +38,15 @@ pub struct Uncertainty {
 ///
 /// `held[j]` takes a parameter out (held by its bound). `scaled` is false when r are already in units of their true
 /// standard deviations, so that s² = 1.
-pub fn uncertainty(jac: &[f64], m: usize, names: &[&str], values: &[f64], held: &[bool], sse: f64, scaled: bool) -> Uncertainty {
+pub fn uncertainty(
+    jac: &[f64],
+    m: usize,
+    names: &[&str],
+    values: &[f64],
+    held: &[bool],
+    sse: f64,
+    scaled: bool,
+) -> Uncertainty {
     let n = names.len();
     let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
     let p = free.len();
@@ -70,10 +78,18 @@ pub fn uncertainty(jac: &[f64], m: usize, names: &[&str], values: &[f64], held: 
     let largest = svd.singular_values.max();
     // Rows of Vᵀ in the pivoted order; tells for each singular vector its components in the original order.
     let component = |row: usize, j: usize| {
-        let place = qr.order.iter().position(|&o| o == j).expect("a permutation");
+        let place = qr
+            .order
+            .iter()
+            .position(|&o| o == j)
+            .expect("a permutation");
         v_t[(row, place)]
     };
-    let seen: Vec<bool> = svd.singular_values.iter().map(|&s| s > RANK_TOL * largest && s > 0.0).collect();
+    let seen: Vec<bool> = svd
+        .singular_values
+        .iter()
+        .map(|&s| s > RANK_TOL * largest && s > 0.0)
+        .collect();
     out.rank = seen.iter().filter(|&&s| s).count();
     out.dof = m.saturating_sub(out.rank);
     let variance = if !scaled {
@@ -88,18 +104,33 @@ pub fn uncertainty(jac: &[f64], m: usize, names: &[&str], values: &[f64], held: 
     let hidden: Vec<usize> = (0..p).filter(|&r| !seen[r]).collect();
     let mut null: Vec<Vec<f64>> = hidden
         .iter()
-        .map(|&r| (0..p).map(|j| if lengths[j] > 0.0 { component(r, j) / lengths[j] } else { component(r, j) }).collect())
+        .map(|&r| {
+            (0..p)
+                .map(|j| {
+                    if lengths[j] > 0.0 {
+                        component(r, j) / lengths[j]
+                    } else {
+                        component(r, j)
+                    }
+                })
+                .collect()
+        })
         .collect();
     let in_null: Vec<bool> = (0..p)
         .map(|j| hidden.iter().any(|&r| component(r, j).abs() > 1e-6))
         .collect();
     reduce(&mut null);
     for direction in &null {
-        out.invisible.push(in_words(direction, &free, names, values));
+        out.invisible
+            .push(in_words(direction, &free, names, values));
     }
 
     // Covariance over the unit columns.
-    let covariance = if out.rank == p { triangle_covariance(&qr) } else { None };
+    let covariance = if out.rank == p {
+        triangle_covariance(&qr)
+    } else {
+        None
+    };
     let covariance = covariance.unwrap_or_else(|| {
         let mut c = vec![0.0; p * p];
         for a in 0..p {
@@ -149,7 +180,9 @@ fn triangle_covariance(qr: &PivotedR) -> Option<Vec<f64>> {
     for a in 0..p {
         for b in 0..p {
             // R⁻¹R⁻ᵀ, entry (a, b) in pivoted order.
-            let sum: f64 = (0..p).map(|j| inverse[j * p + a] * inverse[j * p + b]).sum();
+            let sum: f64 = (0..p)
+                .map(|j| inverse[j * p + a] * inverse[j * p + b])
+                .sum();
             c[qr.order[a] * p + qr.order[b]] = sum;
         }
     }
@@ -158,7 +191,9 @@ fn triangle_covariance(qr: &PivotedR) -> Option<Vec<f64>> {
 
 /// Gauss–Jordan on the null vectors, so that each names as few parameters as possible.
 fn reduce(null: &mut [Vec<f64>]) {
-    let Some(p) = null.first().map(Vec::len) else { return };
+    let Some(p) = null.first().map(Vec::len) else {
+        return;
+    };
     let mut used = vec![false; p];
     for row in 0..null.len() {
         let scale = null[row].iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -176,7 +211,10 @@ fn reduce(null: &mut [Vec<f64>]) {
         for (other, target) in null.iter_mut().enumerate() {
             if other != row {
                 let c = target[pivot];
-                target.iter_mut().zip(&source).for_each(|(t, s)| *t -= c * s);
+                target
+                    .iter_mut()
+                    .zip(&source)
+                    .for_each(|(t, s)| *t -= c * s);
             }
         }
     }
@@ -204,7 +242,10 @@ fn in_words(direction: &[f64], free: &[usize], names: &[&str], values: &[f64]) -
         [] => "no parameter in particular".to_owned(),
         [(j, _)] => format!("{} has no effect on what was measured", names[*j]),
         many => {
-            let list: Vec<String> = many.iter().map(|(j, v)| format!("{} {:+.3} %", names[*j], v)).collect();
+            let list: Vec<String> = many
+                .iter()
+                .map(|(j, v)| format!("{} {:+.3} %", names[*j], v))
+                .collect();
             format!("{} changes nothing that was measured", list.join(", "))
         }
     }
@@ -224,7 +265,11 @@ pub fn student(level: f64, dof: usize) -> f64 {
     }
     for _ in 0..100 {
         let mid = 0.5 * (lo + hi);
-        if tail(mid) > 1.0 - level { lo = mid } else { hi = mid }
+        if tail(mid) > 1.0 - level {
+            lo = mid
+        } else {
+            hi = mid
+        }
     }
     0.5 * (lo + hi)
 }
@@ -245,7 +290,8 @@ pub fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x > (a + 1.0) / (a + b + 2.0) {
         return 1.0 - incomplete_beta(1.0 - x, b, a);
     }
-    let front = (a * x.ln() + b * (1.0 - x).ln() + ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b)).exp() / a;
+    let front =
+        (a * x.ln() + b * (1.0 - x).ln() + ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b)).exp() / a;
     let guard = |v: f64| if v.abs() < 1e-300 { 1e-300 } else { v };
     let (mut c, mut d) = (1.0, 1.0 / guard(1.0 - (a + b) * x / (a + 1.0)));
     let mut f = d;
@@ -283,7 +329,12 @@ fn ln_gamma(x: f64) -> f64 {
     }
     let x = x - 1.0;
     let t = x + 7.5;
-    let sum: f64 = C[1..].iter().enumerate().map(|(i, c)| c / (x + i as f64 + 1.0)).sum::<f64>() + C[0];
+    let sum: f64 = C[1..]
+        .iter()
+        .enumerate()
+        .map(|(i, c)| c / (x + i as f64 + 1.0))
+        .sum::<f64>()
+        + C[0];
     0.5 * std::f64::consts::TAU.ln() + (x + 0.5) * t.ln() - t + sum.ln()
 }
 
@@ -294,8 +345,17 @@ mod tests {
     #[test]
     fn student_quantiles_are_those_of_the_tables() {
         // Abramowitz and Stegun, table 26.10, and the normal limit.
-        for (level, dof, want) in [(0.95, 1, 12.7062), (0.95, 10, 2.2281), (0.99, 5, 4.0321), (0.95, 100_000, 1.95999)] {
-            assert!((student(level, dof) - want).abs() < 1e-4, "{level} {dof} {}", student(level, dof));
+        for (level, dof, want) in [
+            (0.95, 1, 12.7062),
+            (0.95, 10, 2.2281),
+            (0.99, 5, 4.0321),
+            (0.95, 100_000, 1.95999),
+        ] {
+            assert!(
+                (student(level, dof) - want).abs() < 1e-4,
+                "{level} {dof} {}",
+                student(level, dof)
+            );
         }
     }
 
@@ -308,9 +368,20 @@ mod tests {
         jac.extend(t.map(|t| b * t));
         jac.extend(t.map(|t| a * t));
         jac.extend([1.0; 5]);
-        let u = uncertainty(&jac, 5, &["a", "b", "c"], &[a, b, 1.0], &[false; 3], 0.01, true);
+        let u = uncertainty(
+            &jac,
+            5,
+            &["a", "b", "c"],
+            &[a, b, 1.0],
+            &[false; 3],
+            0.01,
+            true,
+        );
         assert_eq!((u.rank, u.free), (2, 3));
-        assert_eq!(u.invisible, ["a +1.000 %, b -1.000 % changes nothing that was measured"]);
+        assert_eq!(
+            u.invisible,
+            ["a +1.000 %, b -1.000 % changes nothing that was measured"]
+        );
         assert!(u.standard_error[0].is_none() && u.standard_error[1].is_none());
         // The constant's error does not care about the product: 0.01/3 · (1/n + mean²/Sxx).
         let mean = t.iter().sum::<f64>() / 5.0;

@@ -1,6 +1,10 @@
 //! The 27 NIST problems: reader of their files, their models on dual numbers, their score.
 
-#![allow(dead_code, reason = "used in parts by a test and by a bench")]
+#![allow(
+    dead_code,
+    unreachable_pub,
+    reason = "used in parts by a test and by a bench"
+)]
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use woven_fit::solve::Residuals;
@@ -193,10 +197,8 @@ impl Nist {
             } else if !words.is_empty() {
                 let y = number(words[0]);
                 nist.y.push(if name == "Nelson" { y.ln() } else { y });
-                nist.x.push([
-                    number(words[1]),
-                    words.get(2).map_or(0.0, |w| number(w)),
-                ]);
+                nist.x
+                    .push([number(words[1]), words.get(2).map_or(0.0, |w| number(w))]);
             }
         }
         assert!(!nist.certified.is_empty() && nist.y.len() > 5, "{name}");

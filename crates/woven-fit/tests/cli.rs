@@ -1,0 +1,185 @@
+//! The command line as scripts rely on it: answers, exit codes, sentences for bad input.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn run(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_woven-fit"))
+        .args(args)
+        .output()
+        .expect("the binary runs")
+}
+
+fn measurement() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../assets/measurements/mecho_6216_goniometer.xml")
+}
+
+/// A sentence on stderr, exit code 1, no panic.
+fn refused(output: &Output, words: &[&str]) {
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(matches!(output.status.code(), Some(1 | 2)), "{text}");
+    assert!(!text.contains("panicked"), "{text}");
+    for word in words {
+        assert!(text.contains(word), "no {word:?} in {text}");
+    }
+}
+
+#[test]
+fn a_truncated_file_is_a_sentence() {
+    let dir = tempfile::tempdir().unwrap();
+    let whole = std::fs::read(measurement()).unwrap();
+    let path = dir.path().join("cut.xml");
+    std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    refused(&run(&["fit", path.to_str().unwrap()]), &["cut.xml", "XML"]);
+    refused(&run(&["info", path.to_str().unwrap()]), &["cut.xml"]);
+}
+
+#[test]
+fn unknown_names_are_sentences_that_help() {
+    let path = measurement();
+    let path = path.to_str().unwrap();
+    refused(
+        &run(&["fit", path, "--model", "velvet"]),
+        &["velvet", "ggx-mirrored"],
+    );
+    refused(
+        &run(&["eval", "--model", "lambert", "--param", "gloss=1", path]),
+        &["gloss", "k_d"],
+    );
+    refused(&run(&["fit", path, "--metric", "cubic"]), &["cubic"]);
+    refused(&run(&["fit"]), &["DATA"]);
+    refused(&run(&["info", "nowhere.xml"]), &["nowhere.xml"]);
+    refused(&run(&["info", "picture.jpeg"]), &["picture.jpeg"]);
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_made_is_a_sentence() {
+    let dir = tempfile::tempdir().unwrap();
+    // A file stands where the folder should be: also root cannot write there.
+    let out = dir.path().join("taken");
+    std::fs::write(&out, "a file").unwrap();
+    let path = measurement();
+    refused(
+        &run(&[
+            "fit",
+            path.to_str().unwrap(),
+            "--model",
+            "lambert",
+            "--out",
+            out.to_str().unwrap(),
+        ]),
+        &["taken"],
+    );
+}
+
+#[test]
+fn eval_gives_the_lambert_floor() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("dirs.csv");
+    std::fs::write(
+        &path,
+        "lx,ly,lz,vx,vy,vz\n0,0,1,0,0,-1\n0,0,2,0.6,0,-0.8\n0,0,1,0,0,1\n",
+    )
+    .unwrap();
+    let output = run(&[
+        "eval",
+        "--model",
+        "lambert",
+        "--param",
+        "k_d=0.5",
+        path.to_str().unwrap(),
+    ]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "lx,ly,lz,vx,vy,vz,f,pdf");
+    let f = |line: &str| line.split(',').nth(6).unwrap().parse::<f64>().unwrap();
+    let floor = 0.5 / std::f64::consts::PI;
+    assert!((f(lines[1]) - floor).abs() < 1e-12 && (f(lines[2]) - floor).abs() < 1e-12);
+    assert_eq!(f(lines[3]), 0.0, "transmission only");
+    std::fs::write(&path, "lx,ly,lz,vx,vy,vz\n0,0,zero,0,0,-1\n").unwrap();
+    refused(
+        &run(&["eval", "--model", "lambert", path.to_str().unwrap()]),
+        &["line 2", "zero"],
+    );
+}
+
+#[test]
+fn models_as_json_list_every_parameter() {
+    let output = run(&["models", "--json"]);
+    let list: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let names: Vec<&str> = list
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|m| m["name"].as_str().unwrap())
+        .collect();
+    for name in ["lambert", "ward", "hgf", "ggx-mirrored", "sheet"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    assert!(list[0]["params"][0]["max"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn info_tells_peak_skirt_and_floor_of_the_goniometer_file() {
+    let path = measurement();
+    let output = run(&["info", "--json", path.to_str().unwrap()]);
+    let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let parts = &info["blocks"][0]["normal"];
+    // The sums that come with the data: 0.0179 = 0.0128 + 0.0014 + 0.0037; within 5 %.
+    for (part, want) in [("peak", 0.0128), ("skirt", 0.0014), ("floor", 0.0037)] {
+        let found = parts[part].as_f64().unwrap();
+        assert!(
+            (found / want - 1.0).abs() < 0.05,
+            "{part}: {found} for {want}"
+        );
+    }
+}
+
+#[test]
+fn convert_to_csv_and_fit_that() {
+    let dir = tempfile::tempdir().unwrap();
+    let csv = dir.path().join("shade.csv");
+    let path = measurement();
+    let output = run(&["convert", path.to_str().unwrap(), csv.to_str().unwrap()]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let out = dir.path().join("fit");
+    let output = run(&[
+        "fit",
+        csv.to_str().unwrap(),
+        "--model",
+        "lambert",
+        "--plane",
+        "normal",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let json: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("fit.json")).unwrap()).unwrap();
+    assert!(
+        json["command"]
+            .as_str()
+            .unwrap()
+            .starts_with("woven-fit fit")
+    );
+    assert!(json["notes"].to_string().contains("oblique"));
+    assert!(
+        std::fs::read_to_string(out.join("report.html"))
+            .unwrap()
+            .contains("</html>")
+    );
+}

@@ -73,6 +73,9 @@ impl Obstacles {
     }
 }
 
+/// Acceleration of vertices that touch, m/s².
+const REPULSION: f64 = 150.0;
+
 /// Contact of the cloth with itself: vertices of different folds keep their distance.
 ///
 /// Two vertices that lie further apart on the cloth than `ring` cells repel each other inside `distance`, which is at least the
@@ -106,7 +109,7 @@ impl SelfContact {
     }
 
     /// Separates close pairs in `x`; the sheet still has the places before the step.
-    pub(crate) fn resolve(&mut self, sheet: &Sheet, x: &mut Field) {
+    pub(crate) fn resolve(&mut self, sheet: &Sheet, x: &mut Field, hp: f64) {
         self.gather_if_moved(sheet, x);
         let d2 = self.distance * self.distance;
         for &(a, b) in &self.pairs {
@@ -121,8 +124,10 @@ impl SelfContact {
                 continue;
             }
             let l = l2.sqrt();
-            // A soft push (a tenth of the overlap a step) keeps stacked folds from buzzing.
-            let push = 0.1 * (self.distance - l) / (l * (wa + wb));
+            // Repulsion as an acceleration: enough to stop folds that meet at 1 m/s within a grid's spacing, too weak to stretch
+            // threads when folds are caught in each other.
+            let way_out = REPULSION * hp * hp * (1.0 - l / self.distance);
+            let push = way_out / (l * (wa + wb));
             let before: [f64; 3] = std::array::from_fn(|c| sheet.x[c][b] - sheet.x[c][a]);
             let mut slip: [f64; 3] = std::array::from_fn(|c| d[c] - before[c]);
             let along = (slip[0] * d[0] + slip[1] * d[1] + slip[2] * d[2]) / l2;
@@ -131,7 +136,7 @@ impl SelfContact {
             }
             let way = slip.iter().map(|s| s * s).sum::<f64>().sqrt();
             let hold = if way > 0.0 {
-                (self.friction * 0.1 * (self.distance - l) / way).min(1.0) / (wa + wb)
+                (self.friction * way_out / way).min(1.0) / (wa + wb)
             } else {
                 0.0
             };
@@ -258,7 +263,7 @@ mod tests {
         }
         let mut contact = SelfContact::new(0.04, 0.0);
         let mut x = sheet.x.clone();
-        contact.resolve(&sheet, &mut x);
+        contact.resolve(&sheet, &mut x, 1e-3);
         assert!(
             x[2][40] > 0.01 && x[2][0] < 0.0,
             "the ends part: {} {}",

@@ -17,6 +17,8 @@ pub(crate) struct Block {
     pub(crate) z: Vec<Lane>,
     /// Inverse masses.
     pub(crate) w: Vec<Lane>,
+    /// Force of each edge over the step before and, after `solve`, of this one (times h'²; negative is tension), kg m.
+    pub(crate) lambda: Vec<Lane>,
     /// Displacement since the last step, used when there is damping.
     pub(crate) d: [Vec<Lane>; 3],
     nx: Vec<Lane>,
@@ -47,6 +49,7 @@ impl Block {
             y: lane(),
             z: lane(),
             w: lane(),
+            lambda: lane(),
             d: [lane(), lane(), lane()],
             nx: lane(),
             ny: lane(),
@@ -63,6 +66,7 @@ impl Block {
             self.y[j][l] = self.y[j][0];
             self.z[j][l] = self.z[j][0];
             self.w[j][l] = self.w[j][0];
+            self.lambda[j][l] = self.lambda[j][0];
         }
     }
 
@@ -88,6 +92,7 @@ impl Block {
         );
         let (nx, ny, nz) = (&mut self.nx[..n], &mut self.ny[..n], &mut self.nz[..n]);
         let (c, r) = (&mut self.c[..n], &mut self.r[..n]);
+        let before = &mut self.lambda[..n];
         let [d0, d1, d2] = &self.d;
         let (mut px, mut py, mut pz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         let (mut cp, mut rp) = ([0.0; LANES], [0.0; LANES]);
@@ -110,7 +115,7 @@ impl Block {
                 let b = -w[j][l] * (ex[l] * px[l] + ey[l] * py[l] + ez[l] * pz[l]) * g;
                 let a = (w[j][l] + w[j + 1][l]) * g + soft;
                 let m = 1.0 / (a - b * cp[l]).max(1e-300);
-                rr[l] = -stretch;
+                rr[l] = -stretch - soft * before[j][l];
                 if damping > 0.0 {
                     let v = ex[l] * (d0[j + 1][l] - d0[j][l])
                         + ey[l] * (d1[j + 1][l] - d1[j][l])
@@ -147,6 +152,7 @@ impl Block {
                 } else {
                     r[j][l]
                 };
+                before[j][l] += lambda[l];
                 let (gx, gy, gz) = (
                     lambda[l] * nx[j][l],
                     lambda[l] * ny[j][l],

@@ -16,7 +16,7 @@ use crate::wind::{AirState, Drag, WIND_TICK, Wind, air_forces, sample};
 /// Ticks a second.
 pub const TICKS: f64 = 600.0;
 const TICKS_PER_WIND: u64 = 10;
-const MAGIC: &[u8; 8] = b"WOVENCL1";
+const MAGIC: &[u8; 8] = b"WOVENCL2";
 
 /// One moment of the clip.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -107,7 +107,7 @@ impl Simulation {
         stepper.obstacles = spec.obstacles.clone();
         if spec.self_contact {
             // The grid's spacing is the least that keeps a vertex from slipping between the corners of a cell.
-            let distance = sheet.hx.max(sheet.hy).max(sheet.mechanics.thickness);
+            let distance = (0.7 * sheet.hx.max(sheet.hy)).max(sheet.mechanics.thickness);
             stepper.self_contact = Some(SelfContact::new(distance, spec.friction));
         }
         let drag = Drag::new(&sheet.mechanics, spec.wind.tangential, spec.wind.speed);
@@ -351,6 +351,7 @@ impl Simulation {
             .chain(&s.v)
             .chain(&t.x_old)
             .chain(&t.v_old)
+            .chain(&t.lambda)
             .chain(&a.now)
             .chain(&a.next)
     }
@@ -386,6 +387,7 @@ impl Simulation {
                 .chain(&mut s.v)
                 .chain(&mut t.x_old)
                 .chain(&mut t.v_old)
+                .chain(&mut t.lambda)
                 .chain(&mut a.now)
                 .chain(&mut a.next)
         {

@@ -29,6 +29,9 @@ pub struct Stepper {
     /// Positions and velocities one step back.
     pub(crate) x_old: Field,
     pub(crate) v_old: Field,
+    /// lambda of every warp edge, at the index of its upper vertex, and of every weft edge, at its left vertex: the forces of the
+    /// step before (times h'²), which this step starts from.
+    pub(crate) lambda: [Vec<f64>; 2],
     /// False until there are two steps to look back on.
     pub(crate) history: bool,
     /// Force of the air, held over the steps of a tick, N.
@@ -77,6 +80,7 @@ impl Stepper {
             tau_bending: tau.min(limit(Shape::bending_omega2(sheet))),
             x_old: zeros(n),
             v_old: zeros(n),
+            lambda: [vec![0.0; n], vec![0.0; n]],
             history: false,
             air: zeros(n),
             settling: 0.0,
@@ -111,6 +115,9 @@ impl Stepper {
         } else {
             self.dt
         };
+        if !self.history {
+            self.lambda.iter_mut().for_each(|l| l.fill(0.0));
+        }
         self.predict(sheet, hp);
         self.add_forces(sheet, hp);
         let damping = sheet.mechanics.stretch_damping / hp;
@@ -121,7 +128,7 @@ impl Stepper {
             self.warp_block(sheet, i0, hp, damping);
         }
         if let Some(contact) = &mut self.self_contact {
-            contact.resolve(sheet, &mut self.pred);
+            contact.resolve(sheet, &mut self.pred, hp);
         }
         self.obstacles.resolve(sheet, &mut self.pred);
         for &k in &self.pins {
@@ -145,6 +152,13 @@ impl Stepper {
                 self.v_old[c][k] = 0.0;
                 self.x_old[c][k] = sheet.x[c][k];
             }
+        }
+        if !self.history {
+            // The next step has h' = 2/3 of this one's.
+            self.lambda
+                .iter_mut()
+                .flatten()
+                .for_each(|l| *l *= 4.0 / 9.0);
         }
         self.history = true;
     }
@@ -182,6 +196,7 @@ impl Stepper {
         for c in 0..3 {
             self.f[c].copy_from_slice(&self.air[c]);
         }
+        self.start_from_last_tension(nx, ny, 1.0 / (hp * hp));
         self.probe_at(self.tau_shear);
         self.shape.add_shear(nx, ny, &self.probe, &mut self.f);
         self.probe_at(self.tau_bending);
@@ -199,6 +214,32 @@ impl Stepper {
             for c in 0..3 {
                 self.pred[c][k] = sheet.x[c][k];
             }
+        }
+    }
+
+    /// Adds the thread forces of the step before, along the predicted directions. The solves below then only correct them: what
+    /// warp and weft do to each other, which one pass would leave too soft, is made up over a few steps.
+    fn start_from_last_tension(&mut self, nx: usize, ny: usize, r: f64) {
+        let [x, y, z] = &self.pred;
+        let [fx, fy, fz] = &mut self.f;
+        let mut edges = |lambda: &[f64], a0: usize, b0: usize, count: usize| {
+            for k in 0..count {
+                let (a, b) = (a0 + k, b0 + k);
+                let (dx, dy, dz) = (x[b] - x[a], y[b] - y[a], z[b] - z[a]);
+                let t = lambda[a] * r / (dx * dx + dy * dy + dz * dz).sqrt().max(1e-12);
+                fx[a] -= t * dx;
+                fx[b] += t * dx;
+                fy[a] -= t * dy;
+                fy[b] += t * dy;
+                fz[a] -= t * dz;
+                fz[b] += t * dz;
+            }
+        };
+        for j in 0..ny {
+            if j + 1 < ny {
+                edges(&self.lambda[0], j * nx, (j + 1) * nx, nx);
+            }
+            edges(&self.lambda[1], j * nx, j * nx + 1, nx - 1);
         }
     }
 
@@ -220,6 +261,7 @@ impl Stepper {
             b.y[j][..lanes].copy_from_slice(&self.pred[1][r..r + lanes]);
             b.z[j][..lanes].copy_from_slice(&self.pred[2][r..r + lanes]);
             b.w[j][..lanes].copy_from_slice(&sheet.inv_mass[r..r + lanes]);
+            b.lambda[j][..lanes].copy_from_slice(&self.lambda[0][r..r + lanes]);
             b.fill_spare(j, lanes);
             if damping > 0.0 {
                 for c in 0..3 {
@@ -253,6 +295,7 @@ impl Stepper {
             self.pred[0][r..r + lanes].copy_from_slice(&b.x[j][..lanes]);
             self.pred[1][r..r + lanes].copy_from_slice(&b.y[j][..lanes]);
             self.pred[2][r..r + lanes].copy_from_slice(&b.z[j][..lanes]);
+            self.lambda[0][r..r + lanes].copy_from_slice(&b.lambda[j][..lanes]);
         }
     }
 
@@ -267,6 +310,7 @@ impl Stepper {
                 b.y[i][l] = self.pred[1][r + i];
                 b.z[i][l] = self.pred[2][r + i];
                 b.w[i][l] = sheet.inv_mass[r + i];
+                b.lambda[i][l] = self.lambda[1][r + i];
             }
             if damping > 0.0 {
                 for c in 0..3 {
@@ -306,6 +350,7 @@ impl Stepper {
                 self.pred[0][r + i] = b.x[i][l];
                 self.pred[1][r + i] = b.y[i][l];
                 self.pred[2][r + i] = b.z[i][l];
+                self.lambda[1][r + i] = b.lambda[i][l];
             }
         }
     }

@@ -273,72 +273,6 @@ pub(crate) struct AirState {
     pub(crate) next: Field,
 }
 
-/// A coarse lattice of eddy velocities around the sheet, because a sum of waves at each cell would cost more than the cloth.
-struct Lattice {
-    origin: [f64; 3],
-    inv_step: f64,
-    n: [usize; 3],
-    u: Vec<[f64; 3]>,
-}
-
-impl Lattice {
-    fn around(sheet: &Sheet, wind: &Wind, t: f64) -> Self {
-        // Five points per shortest wave.
-        let step = 0.5 * wind.spec.eddy_length / 5.0 * 1.2;
-        let (mut origin, mut n) = ([0.0; 3], [0; 3]);
-        let mut step_used = step;
-        for c in 0..3 {
-            let lo = sheet.x[c].iter().copied().fold(f64::INFINITY, f64::min);
-            let hi = sheet.x[c].iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            // At most 40 points a side: a huge curtain in tiny eddies gets a coarser lattice.
-            step_used = step_used.max((hi - lo) / 38.0);
-            origin[c] = lo;
-        }
-        for c in 0..3 {
-            let hi = sheet.x[c].iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            // Lattice points lie at whole multiples of the step, so the air does not swim with the cloth.
-            origin[c] = (origin[c] / step_used).floor() * step_used;
-            n[c] = ((hi - origin[c]) / step_used).floor().max(0.0) as usize + 2;
-        }
-        let mut u = Vec::with_capacity(n[0] * n[1] * n[2]);
-        for k in 0..n[2] {
-            for j in 0..n[1] {
-                for i in 0..n[0] {
-                    let p = [i, j, k];
-                    u.push(wind.eddy(
-                        std::array::from_fn(|c| origin[c] + p[c] as f64 * step_used),
-                        t,
-                    ));
-                }
-            }
-        }
-        Self {
-            origin,
-            inv_step: 1.0 / step_used,
-            n,
-            u,
-        }
-    }
-
-    fn at(&self, p: [f64; 3]) -> [f64; 3] {
-        let (mut cell, mut frac) = ([0usize; 3], [0.0; 3]);
-        for c in 0..3 {
-            let s =
-                ((p[c] - self.origin[c]) * self.inv_step).clamp(0.0, (self.n[c] - 1) as f64 - 1e-9);
-            cell[c] = s as usize;
-            frac[c] = s - cell[c] as f64;
-        }
-        let base = (cell[2] * self.n[1] + cell[1]) * self.n[0] + cell[0];
-        let (dy, dz) = (self.n[0], self.n[0] * self.n[1]);
-        std::array::from_fn(|c| {
-            let u = |k: usize| self.u[base + k][c];
-            let row = |k: usize| u(k) + (u(k + 1) - u(k)) * frac[0];
-            let plane = |k: usize| row(k) + (row(k + dy) - row(k)) * frac[1];
-            plane(0) + (plane(dz) - plane(0)) * frac[2]
-        })
-    }
-}
-
 /// The wind at every cell's middle at time `t`.
 pub(crate) fn sample(sheet: &Sheet, wind: &Wind, t: f64, out: &mut Field) {
     let (nx, ny) = (sheet.nx, sheet.ny);
@@ -351,20 +285,33 @@ pub(crate) fn sample(sheet: &Sheet, wind: &Wind, t: f64, out: &mut Field) {
     }
     let mean = wind.mean_speed(t);
     let calm = (mean.abs() / wind.spec.speed.max(1e-9)).min(1.0);
-    let lattice = (!wind.eddies.is_empty()).then(|| Lattice::around(sheet, wind, t));
+    // Eddies at a coarser grid of cells, bilinear between: six points to the shortest wave of half an eddy's length.
+    let stride = |h: f64, cells: usize| {
+        ((wind.spec.eddy_length / (12.0 * h)) as usize).clamp(1, cells.max(1))
+    };
+    let (sx, sy) = (stride(sheet.hx, nx - 1), stride(sheet.hy, ny - 1));
+    let (mx, my) = ((nx - 1).div_ceil(sx) + 1, (ny - 1).div_ceil(sy) + 1);
+    let at = |i: usize, j: usize| -> [f64; 3] {
+        let k = j.min(ny - 1) * nx + i.min(nx - 1);
+        sheet.position(k)
+    };
+    let coarse: Vec<[f64; 3]> = (0..my)
+        .flat_map(|j| (0..mx).map(move |i| (i, j)))
+        .map(|(i, j)| {
+            let p = at(i * sx, j * sy);
+            let (jet, e) = (wind.jet(p), wind.eddy(p, t));
+            std::array::from_fn(|c| jet * (mean * wind.n[c] + calm * e[c]))
+        })
+        .collect();
     for j in 0..ny - 1 {
+        let (cj, fj) = (j / sy, ((j % sy) as f64 + 0.5) / sy as f64);
         for i in 0..nx - 1 {
-            let k = j * nx + i;
-            let p: [f64; 3] = std::array::from_fn(|c| {
-                0.25 * (sheet.x[c][k]
-                    + sheet.x[c][k + 1]
-                    + sheet.x[c][k + nx]
-                    + sheet.x[c][k + nx + 1])
-            });
-            let jet = wind.jet(p);
-            let e = lattice.as_ref().map_or([0.0; 3], |l| l.at(p));
+            let (ci, fi) = (i / sx, ((i % sx) as f64 + 0.5) / sx as f64);
+            let (a, b) = (cj * mx + ci, (cj + 1) * mx + ci);
             for c in 0..3 {
-                out[c][j * (nx - 1) + i] = jet * (mean * wind.n[c] + calm * e[c]);
+                let top = coarse[a][c] + (coarse[a + 1][c] - coarse[a][c]) * fi;
+                let low = coarse[b][c] + (coarse[b + 1][c] - coarse[b][c]) * fi;
+                out[c][j * (nx - 1) + i] = top + (low - top) * fj;
             }
         }
     }

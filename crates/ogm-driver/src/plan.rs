@@ -497,7 +497,17 @@ impl Plan {
         let (mut here, mut seconds) = (rig.pulses(Self::REFERENCE)?, 0.0);
         let exposures: f64 = self.exposure.ladder_ms[0]
             + self.exposure.ladder_ms.last().unwrap_or(&0.0) * f64::from(self.exposure.repeats);
+        // Calibration and every resume go by the reference pose: all of that is tried before the first byte goes out.
+        let reference = here;
+        rig.way(&[0; AXES], Self::REFERENCE)?;
+        if self.calibration.white {
+            let white = rig.pulses(Self::WHITE)?;
+            rig.way(&reference, Self::WHITE)?;
+            rig.way(&white, Self::REFERENCE)?;
+        }
         for &i in &order {
+            rig.way(&reference, poses[i])?;
+            rig.way(&targets[i], Self::REFERENCE)?;
             for leg in rig.way(&here, poses[i])? {
                 seconds += rig.leg_seconds(&here, &leg) + rig.settle_ms as f64 / 1000.0;
                 here = leg;

@@ -96,7 +96,7 @@ struct FitArgs {
     #[arg(long)]
     cos_weight: bool,
     /// Starts per model.
-    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=4096))]
     starts: u16,
     /// Folder for fit.json, the fabric and the report; without it nothing is written.
     #[arg(long)]

@@ -43,7 +43,7 @@ impl Default for Options {
             metric: Metric::Linear,
             normal_only: false,
             seed: 1,
-            starts: 16,
+            starts: 8,
             loss: Loss::Squares,
             cosine_weights: false,
         }
@@ -315,7 +315,11 @@ pub fn fit(data: &Measurement, options: &Options, progress: Progress<'_>) -> Res
             }
             let held = (fit.values[k_r] - excess).max(0.0);
             spec.hold("k_r", held);
-            fit = fit_spec(&spec, &coarse, &reflection_points, options)?;
+            let options = Options {
+                starts: 2,
+                ..options.clone()
+            };
+            fit = fit_spec(&spec, &coarse, &reflection_points, &options)?;
         }
         if wanted > 1.0 + 1e-4 {
             notes.push(format!(
@@ -497,7 +501,7 @@ pub fn fit_spec(
     let weights = groups.weights(coarse, &base, &guess(coarse, gap), known);
     let weights = linearised(coarse, &weights, options.metric, floor);
     let settings = Settings {
-        max_evaluations: 80,
+        max_evaluations: 50,
         polish: 0,
         offset_tol: 1e-4,
         ..Settings::default()
@@ -692,7 +696,16 @@ fn finish(
 ) -> Option<Finished> {
     let eval = Evaluator { spec, points: full };
     let (base, known) = base_weights(full, options);
-    let settings = Settings::default();
+    // Thousands of rows with some per cent of scatter: the twelfth digit is not worth its time.
+    let settings = if full.points.len() > 2000 {
+        Settings {
+            offset_tol: 1e-5,
+            polish: 2,
+            ..Settings::default()
+        }
+    } else {
+        Settings::default()
+    };
     let quick = Settings {
         max_evaluations: 10,
         polish: 0,

@@ -247,15 +247,18 @@ fn klems_points(k: &Klems, block: &Block, detail: Detail, normal_only: bool) -> 
             // Transmitted lobes are a few degrees narrow, reflected ones broad.
             let finer = if block.kind.transmits() { 4 } else { 1 };
             let count = match (detail, off) {
-                (Detail::Full, a) if a < NEAR => 8 * finer,
-                (Detail::Full, a) if a < MIDDLE => 6,
-                (Detail::Full, _) => 2,
+                // A model without gap may put a lobe far narrower than the patch here.
+                (Detail::Full, _) if i == o => 40 * finer,
+                (Detail::Full, a) if a < NEAR => 6 * finer,
+                (Detail::Full, a) if a < MIDDLE => 4,
+                (Detail::Full, _) => 1,
                 (Detail::Coarse, a) if a < NEAR => 2 * finer,
                 (Detail::Coarse, _) => 1,
             };
             let first = out.nodes.len();
             for s in 0..count {
-                let [a, b, c, d] = lattice(s);
+                // A single node stands in the centres.
+                let [a, b, c, d] = if count == 1 { [0.5; 4] } else { lattice(s) };
                 out.nodes.push(Node {
                     l: block.kind.l(incident.at(a, b)),
                     v: block.kind.v(outgoing.at(c, d)),

@@ -8,7 +8,7 @@ fn fit(models: &[&str]) -> FitResult {
         .join("../../assets/measurements/mecho_6216_goniometer.xml");
     let options = Options {
         models: Some(models.iter().map(|m| (*m).to_owned()).collect()),
-        starts: 4,
+        starts: 2,
         ..Options::default()
     };
     fit_measurement(&path, &options, &quiet).unwrap()

@@ -19,6 +19,7 @@ mod fabrics;
 mod force;
 mod line;
 mod mesh;
+pub mod preview;
 mod rail;
 mod random;
 mod reference;

@@ -49,6 +49,21 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// A strip of simply shaded frames of a cache, as PNG
+    #[command(after_help = "Example:\n  woven-cloth preview curtain.glb -o strip.png --count 6")]
+    Preview {
+        /// A cache that `simulate` wrote as .glb
+        cache: PathBuf,
+        /// The PNG to write
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Number of pictures: the rest pose and frames evenly over the clip
+        #[arg(long, default_value_t = 6)]
+        count: usize,
+        /// Height in pixels
+        #[arg(long, default_value_t = 480)]
+        height: usize,
+    },
     /// List the built-in fabrics
     #[command(after_help = "Example:\n  woven-cloth fabrics")]
     Fabrics,
@@ -88,6 +103,39 @@ fn run(cli: Cli) -> anyhow::Result<()> {
             } else {
                 simulate(&spec, &output, every, json)
             }
+        }
+        Command::Preview {
+            cache,
+            output,
+            count,
+            height,
+        } => {
+            let clip = CurtainClip::read(&cache)?;
+            anyhow::ensure!(
+                !clip.mesh.indices.is_empty(),
+                "{} has no faces to draw; give a .glb",
+                cache.display()
+            );
+            anyhow::ensure!(
+                (32..=4096).contains(&height),
+                "--height {height} is outside 32 to 4096 pixels"
+            );
+            let p = woven_cloth::preview::strip(&clip, count, height);
+            let picture = image::RgbImage::from_raw(p.width as u32, p.height as u32, p.rgb)
+                .context("the strip has no size")?;
+            let folder = output
+                .parent()
+                .filter(|f| !f.as_os_str().is_empty())
+                .unwrap_or(std::path::Path::new("."));
+            let mut file = tempfile::NamedTempFile::new_in(folder)
+                .with_context(|| format!("cannot write into {}", folder.display()))?;
+            picture.write_to(
+                &mut std::io::BufWriter::new(file.as_file_mut()),
+                image::ImageFormat::Png,
+            )?;
+            file.persist(&output)
+                .with_context(|| format!("cannot write {}", output.display()))?;
+            Ok(())
         }
         Command::Fabrics => {
             println!(

@@ -37,11 +37,11 @@ impl Default for Limits {
 
 /// A scene file taken apart.
 #[derive(Clone, Debug)]
-pub struct Container {
+pub(super) struct Container {
     /// The JSON.
-    pub json: Value,
+    pub(super) json: Value,
     /// The binary chunk of a GLB.
-    pub bin: Option<Vec<u8>>,
+    pub(super) bin: Option<Vec<u8>>,
 }
 
 /// Reads a whole file of at most `limit` bytes.
@@ -79,7 +79,7 @@ pub fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// A sentence when the container is broken or the JSON too deep or malformed.
-pub fn open(bytes: &[u8], limits: &Limits) -> Result<Container> {
+pub(super) fn open(bytes: &[u8], limits: &Limits) -> Result<Container> {
     let (text, bin) = if bytes.starts_with(b"glTF") {
         split_glb(bytes)?
     } else {

@@ -1,0 +1,249 @@
+//! `woven-render animate`: a scene in which one mesh moves, frame by frame; a frame that is there is not made again.
+
+use super::progress::{Bar, stop_flag};
+use super::{RenderArgs, setup};
+use anyhow::{Context, Result, bail, ensure};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Instant;
+use woven_render::atomic::write_atomically;
+use woven_render::render::Renderer;
+use woven_render::scene::gltf::{Limits, motion};
+use woven_render::scene::{Mesh, Scene};
+
+/// Render a scene in which one mesh moves.
+#[derive(clap::Args, Debug)]
+#[command(after_help = "Examples:
+  woven-render animate room.glb --cloth wind.glb --frames 0..48 -o frames
+  woven-render animate room.glb --cloth wind.pc2 --mesh curtain --frames 0..=9 -o frames --format png --denoise --spp 16
+
+A frame that exists and was made with the same settings is kept, so the same command goes on where it was stopped.")]
+pub(crate) struct AnimateArgs {
+    /// The scene, .glb or .gltf.
+    scene: PathBuf,
+    /// The moving mesh: an animated .glb (one morph target a frame) or a .pc2 point cache, in world space.
+    #[arg(long, value_name = "CACHE")]
+    cloth: PathBuf,
+    /// Name of the scene's mesh that moves; the cache's own name without.
+    #[arg(long, value_name = "NAME")]
+    mesh: Option<String>,
+    /// Frames to render: A..B without B, A..=B with it.
+    #[arg(long, value_name = "A..B")]
+    frames: Frames,
+    /// Folder for frame_0000.exr, ...; made if it is not there.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Format of the frames.
+    #[arg(long, value_parser = ["exr", "png"], default_value = "exr")]
+    format: String,
+    #[command(flatten)]
+    render: RenderArgs,
+}
+
+/// `A..B` or `A..=B`, at least one frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Frames {
+    first: usize,
+    end: usize,
+}
+
+impl FromStr for Frames {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = || -> Option<Frames> {
+            let (a, b) = text.split_once("..")?;
+            let (b, extra) = match b.strip_prefix('=') {
+                Some(b) => (b, 1),
+                None => (b, 0),
+            };
+            let (first, end) = (
+                a.trim().parse().ok()?,
+                b.trim().parse::<usize>().ok()?.checked_add(extra)?,
+            );
+            (first < end && end <= 1_000_000).then_some(Frames { first, end })
+        };
+        parse().ok_or_else(|| {
+            format!("'{text}' is no range of frames; write 0..48 (48 is left out) or 0..=47")
+        })
+    }
+}
+
+/// What is known about the frames in a folder; kept in `frames.json` beside them.
+#[derive(Default, Serialize, Deserialize)]
+struct Ledger {
+    /// File name to the hash of the settings that made it.
+    frames: BTreeMap<String, String>,
+}
+
+/// Renders all frames that are not there yet.
+pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
+    std::fs::create_dir_all(&args.output)
+        .with_context(|| format!("cannot make the folder {}", args.output.display()))?;
+    let ledger_path = args.output.join("frames.json");
+    setup::check_writable(&ledger_path)?;
+    let mut job = setup::prepare(&args.scene, &args.render)?;
+    let cache = motion::open(&args.cloth, &Limits::default())?;
+    let Frames { first, end } = args.frames;
+    ensure!(
+        end <= cache.frames,
+        "{} has {} frames (0..{}); {first}..{end} asks for more",
+        args.cloth.display(),
+        cache.frames,
+        cache.frames
+    );
+    let moving = find_mesh(
+        &job.scene,
+        args.mesh.as_deref().unwrap_or(&cache.name),
+        args.mesh.is_some(),
+    )?;
+    job.metadata
+        .insert("cloth.sha256".to_owned(), cache.hash.clone());
+
+    // The ray structure is built for the cache's first frame and refitted from there, wherever a run begins: the same
+    // frame has the same bytes in every run.
+    cache.apply(0, &mut job.scene.meshes[moving])?;
+    let mut ledger: Ledger = std::fs::read(&ledger_path)
+        .ok()
+        .and_then(|b| serde_json::from_slice(&b).ok())
+        .unwrap_or_default();
+    let todo: Vec<usize> = (first..end)
+        .filter(|&k| {
+            let name = file_name(k, &args.format);
+            ledger.frames.get(&name)
+                != Some(&frame_hash(
+                    &job.hash,
+                    &cache.hash,
+                    &job.scene.meshes[moving].name,
+                    k,
+                ))
+                || !args.output.join(&name).is_file()
+        })
+        .collect();
+    let kept = end - first - todo.len();
+    if kept > 0 {
+        eprintln!("{kept} of {} frames are there already", end - first);
+    }
+    if todo.is_empty() {
+        return Ok(());
+    }
+    let mut bar = Bar::new("frame", stop_flag()?);
+    let started = Instant::now();
+    let mut renderer = Renderer::new(&job.scene, &job.settings, job.backend)?;
+    let mut frame: Mesh = job.scene.meshes[moving].clone();
+    for (done, &k) in todo.iter().enumerate() {
+        let left = left(started, done, todo.len());
+        bar.word(&format!("frame {k} ({} of {}{left})", done + 1, todo.len()));
+        cache.apply(k, &mut frame)?;
+        renderer.move_mesh(moving, &frame.positions, &frame.normals)?;
+        renderer.set_seed(job.settings.seed.wrapping_add(k as u32))?;
+        renderer.finish(&mut bar)?;
+        if bar.stopped() && renderer.samples() < job.settings.spp {
+            bar.finish();
+            bail!(
+                "stopped before frame {k}; {} frames are done, the same command goes on from there",
+                kept + done
+            );
+        }
+        let hash = frame_hash(&job.hash, &cache.hash, &frame.name, k);
+        let mut film = renderer.film()?;
+        setup::finish(&mut film, &args.render, &job.metadata, &hash);
+        film.metadata.insert("frame".to_owned(), k.to_string());
+        let name = file_name(k, &args.format);
+        setup::write(
+            &film,
+            &args.output.join(&name),
+            &args.render,
+            job.scene.camera.exposure,
+        )?;
+        ledger.frames.insert(name, hash);
+        write_ledger(&ledger_path, &ledger)?;
+    }
+    bar.finish();
+    if let Some(note) = renderer.note() {
+        bar.say(&format!("note: {note}"));
+    }
+    eprintln!(
+        "{} frames in {:.1} s on {} ({:.2} s a frame)",
+        todo.len(),
+        started.elapsed().as_secs_f64(),
+        renderer.device(),
+        started.elapsed().as_secs_f64() / todo.len() as f64
+    );
+    Ok(())
+}
+
+fn left(started: Instant, done: usize, of: usize) -> String {
+    if done == 0 {
+        return String::new();
+    }
+    let seconds = started.elapsed().as_secs_f64() / done as f64 * (of - done) as f64;
+    format!(", {:.0} s left in all", seconds)
+}
+
+fn file_name(k: usize, format: &str) -> String {
+    format!("frame_{k:04}.{format}")
+}
+
+fn frame_hash(settings: &str, cache: &str, mesh: &str, k: usize) -> String {
+    use sha2::Digest;
+    setup::hex(&sha2::Sha256::digest(format!(
+        "{settings} {cache} {mesh} {k}"
+    )))
+}
+
+fn write_ledger(path: &Path, ledger: &Ledger) -> Result<()> {
+    write_atomically(path, |out| Ok(serde_json::to_writer_pretty(out, ledger)?))
+}
+
+fn find_mesh(scene: &Scene, name: &str, asked: bool) -> Result<usize> {
+    let mut hits = scene
+        .meshes
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| m.name == name)
+        .map(|(i, _)| i);
+    match (hits.next(), hits.next()) {
+        (Some(i), None) => Ok(i),
+        (Some(_), Some(_)) => bail!(
+            "the scene has more than one mesh '{name}'; give the moving one a name of its own"
+        ),
+        (None, _) => {
+            let mut names: Vec<_> = scene.meshes.iter().map(|m| m.name.as_str()).collect();
+            names.dedup();
+            let who = if asked {
+                ""
+            } else {
+                " (the name in the cache)"
+            };
+            bail!(
+                "the scene has no mesh '{name}'{who}; it has {}: choose one with --mesh NAME",
+                names.join(", ")
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_frames() {
+        assert_eq!("0..48".parse(), Ok(Frames { first: 0, end: 48 }));
+        assert_eq!("3..=3".parse(), Ok(Frames { first: 3, end: 4 }));
+        for bad in [
+            "",
+            "5",
+            "5..5",
+            "7..3",
+            "a..b",
+            "0..",
+            "-1..4",
+            "0..=18446744073709551615",
+        ] {
+            assert!(bad.parse::<Frames>().is_err(), "{bad}");
+        }
+    }
+}

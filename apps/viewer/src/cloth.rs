@@ -1,0 +1,271 @@
+//! The cloth on the sliders: a model, its values and colours, and the way from and to a fabric file.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use woven_bsdf::fabric::{Fabric, OpticsTable, WeaveTable};
+use woven_bsdf::measured::Refused;
+use woven_bsdf::model::{Linear, MAX_LINEAR, ModelInfo, Param, Role, Shape, find};
+use woven_bsdf::sheet;
+use woven_bsdf::vec3::Vec3;
+
+use crate::nearest::{Woven, nearest};
+
+/// Luminance of linear Rec. 709.
+#[must_use]
+pub fn luminance(c: [f64; 3]) -> f64 {
+    0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
+}
+
+/// What the sliders stand at.
+#[derive(Clone, Debug, PartialEq)]
+struct Setting {
+    model: &'static str,
+    values: Vec<f64>,
+    colors: Vec<[f64; 3]>,
+}
+
+/// A cloth being looked at and changed.
+#[derive(Clone, Debug)]
+pub struct Cloth {
+    /// The fabric from which it came; optics excepted, it is saved as it was read.
+    fabric: Fabric,
+    /// The model whose sliders are shown.
+    pub model: &'static ModelInfo,
+    /// Values in the order of the model's parameters.
+    pub values: Vec<f64>,
+    /// Colours in the same order; those of shape parameters are not used.
+    pub colors: Vec<[f64; 3]>,
+    /// Diffuse reflection given to models that know transmission only.
+    pub reflect: f64,
+    opened: Option<Setting>,
+}
+
+impl Default for Cloth {
+    fn default() -> Self {
+        let fabric = Fabric { name: "a cloth of my own".to_owned(), ..Fabric::default() };
+        let model = find(<sheet::Sheet as woven_bsdf::model::Model>::NAME).unwrap_or(&woven_bsdf::model::MODELS[0]);
+        Self { fabric, model, values: model.start(), colors: white(model), reflect: 0.4, opened: None }
+    }
+}
+
+fn white(model: &ModelInfo) -> Vec<[f64; 3]> {
+    vec![[1.0; 3]; model.params.len()]
+}
+
+impl Cloth {
+    /// Reads a fabric file.
+    ///
+    /// # Errors
+    /// A sentence with the file and the field.
+    pub fn open(path: &Path) -> Result<Self, Refused> {
+        Self::of(Fabric::read(path)?)
+    }
+
+    /// The cloth of a fabric.
+    ///
+    /// # Errors
+    /// A sentence when its optics are not sound.
+    pub fn of(fabric: Fabric) -> Result<Self, Refused> {
+        let optics = fabric.optics()?;
+        let model = optics.model;
+        let mut shapes = optics.shape.iter();
+        let table = &fabric.optics;
+        let values: Vec<f64> = model
+            .params
+            .iter()
+            .map(|p| match p.role {
+                Role::Linear => table.parameters.get(p.name).copied().unwrap_or(0.0),
+                Role::Shape => shapes.next().copied().unwrap_or(p.start),
+            })
+            .collect();
+        let colors = model.params.iter().map(|p| table.colors.get(p.name).copied().unwrap_or([1.0; 3])).collect();
+        let mut cloth = Self { fabric, model, values, colors, reflect: 0.4, opened: None };
+        cloth.opened = Some(cloth.setting());
+        Ok(cloth)
+    }
+
+    fn setting(&self) -> Setting {
+        Setting { model: self.model.name, values: self.values.clone(), colors: self.colors.clone() }
+    }
+
+    /// What people call the cloth.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.fabric.name
+    }
+
+    /// The named numbers of its mechanics.
+    #[must_use]
+    pub fn mechanics(&self) -> &BTreeMap<String, f64> {
+        &self.fabric.mechanics
+    }
+
+    /// Whether a slider stands elsewhere than in the file.
+    #[must_use]
+    pub fn changed(&self) -> bool {
+        self.opened.as_ref().is_some_and(|o| *o != self.setting())
+    }
+
+    /// Takes another model, at the file's values where the file has it, else at the model's start.
+    pub fn choose(&mut self, model: &'static ModelInfo) {
+        self.model = model;
+        self.reset();
+    }
+
+    /// Puts all sliders back to the file's values, or to the model's start.
+    pub fn reset(&mut self) {
+        match &self.opened {
+            Some(o) if o.model == self.model.name => {
+                (self.values, self.colors) = (o.values.clone(), o.colors.clone());
+            }
+            _ => (self.values, self.colors) = (self.model.start(), white(self.model)),
+        }
+    }
+
+    /// The value to which a slider goes back.
+    #[must_use]
+    pub fn start_of(&self, index: usize) -> f64 {
+        let opened = self.opened.as_ref().filter(|o| o.model == self.model.name);
+        opened.map_or(self.model.params[index].start, |o| o.values[index])
+    }
+
+    /// The parameters with their places.
+    pub fn params(&self, role: Role) -> impl Iterator<Item = (usize, &'static Param)> + use<> {
+        self.model.params.iter().enumerate().filter(move |(_, p)| p.role == role)
+    }
+
+    /// The greatest sum of the sheet's factors over the channels: more than 1 would give more light than the yarn gets.
+    #[must_use]
+    pub fn given(&self) -> f64 {
+        if self.model.name != "sheet" {
+            return 0.0;
+        }
+        let sum = |c: usize| self.params(Role::Linear).map(|(i, _)| self.values[i] * self.colors[i][c]).sum::<f64>();
+        (0..3).map(sum).fold(0.0, f64::max)
+    }
+
+    /// By what the factors are multiplied so that the yarn gives no more than it gets.
+    fn share(&self) -> f64 {
+        1.0 / self.given().max(1.0)
+    }
+
+    /// The coloured linear factors as they are used, and the prepared shape.
+    #[must_use]
+    pub fn optics(&self) -> ([[f64; 3]; MAX_LINEAR], Shape<f64>) {
+        let share = self.share();
+        let mut linear = [[0.0; 3]; MAX_LINEAR];
+        for (k, (i, _)) in linear.iter_mut().zip(self.params(Role::Linear)) {
+            *k = self.colors[i].map(|c| c * self.values[i] * share);
+        }
+        let shape: Vec<f64> = self.params(Role::Shape).map(|(i, _)| self.values[i]).collect();
+        (linear, self.model.prepare(&shape))
+    }
+
+    /// The same with luminances for colours, as the plot shows it.
+    #[must_use]
+    pub fn gray(&self) -> (Linear<f64>, Shape<f64>) {
+        let (linear, shape) = self.optics();
+        (linear.map(luminance), shape)
+    }
+
+    /// The sheet that the renderer draws.
+    #[must_use]
+    pub fn woven(&self) -> Woven {
+        let (linear, shape) = self.optics();
+        nearest(self.model, &linear, &shape, self.reflect)
+    }
+
+    /// The straight-through share for a beam along `w`; 0 for models that have no weave.
+    #[must_use]
+    pub fn gap(&self, w: Vec3<f64>) -> f64 {
+        if self.model.name == "sheet" { sheet::Sheet::gap(&self.optics().1, w) } else { 0.0 }
+    }
+
+    /// The fabric as it would be saved under `name`.
+    #[must_use]
+    pub fn fabric(&self, name: &str) -> Fabric {
+        let share = self.share();
+        let mut optics = OpticsTable { model: self.model.name.to_owned(), ..OpticsTable::default() };
+        for (i, p) in self.model.params.iter().enumerate() {
+            let linear = p.role == Role::Linear;
+            optics.parameters.insert(p.name.to_owned(), if linear { self.values[i] * share } else { self.values[i] });
+            if linear && self.colors[i] != [1.0; 3] {
+                optics.colors.insert(p.name.to_owned(), self.colors[i]);
+            }
+        }
+        let mut fabric = Fabric { name: name.to_owned(), optics, ..self.fabric.clone() };
+        if self.changed() {
+            fabric.provenance.insert("edited".to_owned(), format!("in woven-viewer, from {:?}", self.fabric.name));
+        }
+        if self.weave_contradicts() {
+            fabric.weave = None;
+        }
+        fabric
+    }
+
+    /// Whether the sliders of the weave have left what the file says of its yarns.
+    fn weave_contradicts(&self) -> bool {
+        let Some(WeaveTable { warp_diameter_mm, warp_pitch_mm, weft_diameter_mm, weft_pitch_mm, .. }) = &self.fabric.weave
+        else {
+            return false;
+        };
+        let off = |name: &str, d: f64, pitch: f64| {
+            let at = self.model.params.iter().position(|p| p.name == name);
+            at.is_some_and(|i| (self.values[i] - (d / pitch).clamp(0.0, 1.0)).abs() > 0.01)
+        };
+        off("gamma_warp", *warp_diameter_mm, *warp_pitch_mm) || off("gamma_weft", *weft_diameter_mm, *weft_pitch_mm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use woven_bsdf::model::MODELS;
+
+    const LACE: &str = "name = \"lace\"\n[optics]\nmodel = \"sheet\"\n\
+        parameters = { t_d = 0.3, k_t = 0.1, r_d = 0.5, gamma_warp = 0.5, gamma_weft = 0.4 }\n\
+        [optics.colors]\nr_d = [1.0, 0.9, 0.8]\n[mechanics]\nareal_density_kg_m2 = 0.1\n";
+
+    #[test]
+    fn what_is_saved_is_what_was_seen() {
+        for model in MODELS {
+            let mut cloth = Cloth::default();
+            cloth.choose(model);
+            for (i, p) in model.params.iter().enumerate() {
+                cloth.values[i] = p.min + (p.max - p.min) * 0.3;
+                cloth.colors[i] = [1.0, 0.5, 0.25];
+            }
+            let text = cloth.fabric("again").to_toml();
+            let back = Cloth::of(Fabric::from_toml(&text).expect("its own files are read")).expect("and are sound");
+            let ((a, s), (b, t)) = (cloth.optics(), back.optics());
+            for (x, y) in a.iter().flatten().chain(&s).zip(b.iter().flatten().chain(&t)) {
+                assert!((x - y).abs() < 1e-12 * x.abs().max(1.0), "{}: {x} {y}", model.name);
+            }
+        }
+    }
+
+    #[test]
+    fn reset_goes_back_to_the_file() {
+        let mut cloth = Cloth::of(Fabric::from_toml(LACE).expect("it is sound")).expect("it is sound");
+        let (before, r_d) = (cloth.values.clone(), 2);
+        assert!(!cloth.changed() && cloth.values[r_d] == 0.5);
+        cloth.values[r_d] = 0.1;
+        assert!(cloth.changed() && cloth.start_of(r_d) == 0.5);
+        cloth.reset();
+        assert_eq!(cloth.values, before);
+        assert_eq!(cloth.mechanics()["areal_density_kg_m2"], 0.1);
+    }
+
+    #[test]
+    fn a_yarn_never_gives_more_than_it_gets() {
+        let mut cloth = Cloth::default();
+        for (i, _) in cloth.params(Role::Linear) {
+            cloth.values[i] = 1.0;
+        }
+        assert_eq!(cloth.given(), 4.0);
+        let sum: f64 = cloth.optics().0.iter().map(|k| k[1]).sum();
+        assert!((sum - 1.0).abs() < 1e-12);
+        assert!(Fabric::from_toml(&cloth.fabric("full").to_toml()).is_ok());
+    }
+}

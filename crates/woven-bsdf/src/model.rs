@@ -4,9 +4,16 @@
 //! a renderer colours, times basis functions of a few shape parameters. A new model is one file that implements
 //! [`Model`] and one line in [`MODELS`]; from that line come its sliders, bounds, fit, rank, shader and tests.
 
+pub mod ashikhmin_shirley;
+pub mod cook_torrance;
 pub mod ggx_mirrored;
+pub mod ggx_walter;
 pub mod hgf;
 pub mod lambert;
+pub mod paper;
+pub mod paper_literal;
+pub mod phong;
+pub mod slab;
 pub mod ward;
 
 use crate::dual::Dual;
@@ -265,9 +272,16 @@ pub fn normalized(k: &Linear<f64>) -> Linear<f64> {
 /// All models. Adding one is its file and a line here.
 pub static MODELS: &[ModelInfo] = &[
     ModelInfo::of::<lambert::Lambert>(),
+    ModelInfo::of::<phong::Phong>(),
     ModelInfo::of::<ward::Ward>(),
+    ModelInfo::of::<ashikhmin_shirley::AshikhminShirley>(),
+    ModelInfo::of::<cook_torrance::CookTorrance>(),
     ModelInfo::of::<hgf::Hgf>(),
+    ModelInfo::of::<ggx_walter::GgxWalter>(),
     ModelInfo::of::<ggx_mirrored::GgxMirrored>(),
+    ModelInfo::of::<slab::Slab>(),
+    ModelInfo::of::<paper::Paper>(),
+    ModelInfo::of::<paper_literal::PaperLiteral>(),
     ModelInfo::of::<crate::sheet::Sheet>(),
 ];
 

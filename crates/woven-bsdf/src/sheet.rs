@@ -3,8 +3,11 @@
 //! Three parts are visible in real goniometer data of shade cloth: a straight-through peak, an anisotropic skirt and a
 //! diffuse floor. The peak is the gap ([`Sheet::gap`]), a delta kept apart; the rest is this model's value. Light that
 //! hits the yarn (the cover, 1 - gap) is shared between the four factors, so that
-//! gap + R + T ≤ 1 in every direction whenever t_d + k_t + r_d + k_r ≤ 1, and all terms are reciprocal:
-//! the diffuse terms carry cover(l)·cover(v)/mean cover, the lobes min(cover(l), cover(v)).
+//! gap + R + T ≤ 1 in every direction whenever t_d + k_t + r_d + k_r ≤ 1, and = 1 (to the precision of the albedo's
+//! closed form) whenever they sum to 1 without k_r. All terms are reciprocal. With c the cover, c0 its least value (at
+//! normal incidence) and c̄ its mean: the diffuse terms carry c(l) c(v)/c̄; the forward lobe carries c0, what masking
+//! takes from it comes back diffusely (Kulla and Conty 2017), and the cover that a tilt adds to c0 scatters diffusely
+//! too, as (c(l) - c0)(c(v) - c0)/(c̄ - c0); the reflection lobe carries min(c(l), c(v)).
 
 use crate::model::{Linear, MAX_SHAPE, Model, Param, Shape, fold};
 use crate::real::Real;
@@ -48,32 +51,42 @@ pub mod shape {
     pub const F0: usize = 7;
     /// Derived: 1 / mean cover.
     pub const INV_MEAN_COVER: usize = 8;
-    /// Derived: the one width of the forward lobe that stands for both in the albedo, √(alpha_x alpha_y).
-    pub const ALPHA_MEAN: usize = 9;
     /// Derived: 1 / (mean loss of the forward lobe).
-    pub const INV_MEAN_LOSS: usize = 10;
+    pub const INV_MEAN_LOSS: usize = 9;
+    /// Derived: the first of six coefficients of the forward lobe's loss.
+    pub const LOSS: usize = 10;
 }
 
 use shape::{
-    ALPHA_MEAN, ALPHA_X, ALPHA_Y, F0, GAMMA_WARP, GAMMA_WEFT, INV_MEAN_COVER, INV_MEAN_LOSS,
-    RALPHA_X, RALPHA_Y, SECTION,
+    ALPHA_X, ALPHA_Y, F0, GAMMA_WARP, GAMMA_WEFT, INV_MEAN_COVER, INV_MEAN_LOSS, LOSS, RALPHA_X,
+    RALPHA_Y, SECTION,
 };
 
 /// Share of the forward lobe that masking takes from direction `w`; it is given back diffusely.
 #[inline(always)]
 fn loss<R: Real>(s: &Shape<R>, w: Vec3<R>) -> R {
-    albedo::ggx_loss(w.z.abs(), s[ALPHA_MEAN])
+    let c = std::array::from_fn(|i| s[LOSS + i]);
+    albedo::lobe_loss(w, s[ALPHA_X], s[ALPHA_Y], c)
+}
+
+/// The yarn's share at normal incidence, the least of all directions.
+#[inline(always)]
+fn least_cover<R: Real>(s: &Shape<R>) -> R {
+    (s[GAMMA_WARP].one_minus().pos() * s[GAMMA_WEFT].one_minus().pos()).one_minus()
+}
+
+/// 1 / (mean of the cover that tilting adds); a closed sheet adds none.
+#[inline(always)]
+fn inv_tilted_cover<R: Real>(s: &Shape<R>, least: R) -> R {
+    (s[INV_MEAN_COVER].recip() - least).max(R::of(1e-6)).recip()
 }
 
 /// The chances of (diffuse transmission, forward lobe, diffuse reflection); the reflection lobe has the rest.
 #[inline(always)]
 fn chances<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>) -> [R; 3] {
-    let lost = loss(s, wo);
-    [
-        w[linear::T_D] + w[linear::K_T] * lost,
-        w[linear::K_T] * lost.one_minus(),
-        w[linear::R_D],
-    ]
+    let cover = Sheet::gap(s, wo).one_minus().max(R::of(1e-6));
+    let lobe = w[linear::K_T] * loss(s, wo).one_minus() * (least_cover(s) / cover);
+    [w[linear::T_D] + w[linear::K_T] - lobe, lobe, w[linear::R_D]]
 }
 
 impl Sheet {
@@ -102,8 +115,8 @@ impl Sheet {
 
 impl Model for Sheet {
     const NAME: &'static str = "sheet";
-    const EQUATION: &'static str = "T: c_l c_v t_d/(π c̄) + min(c_l,c_v) k_t (M(l,v') + (1-E_l)(1-E_v)/(π(1-Ē))); \
-        R: c_l c_v r_d/(π c̄) + min(c_l,c_v) k_r M_r(l,v) F(f0); c = 1 - openness; gap: openness·δ";
+    const EQUATION: &'static str = "T: c_l c_v t_d/(π c̄) + k_t [c0 (M(l,v') + (1-E_l)(1-E_v)/(π(1-Ē))) + (c_l-c0)(c_v-c0)/(π(c̄-c0))]; \
+        R: c_l c_v r_d/(π c̄) + min(c_l,c_v) k_r M_r(l,v) F(f0); c = 1 - openness, c0 at normal incidence, c̄ mean; gap: openness·δ";
     const DOC: &'static str = "The woven sheet: openness of the weave as a delta apart, forward GGX lobe along the yarns with its masking \
         loss given back, diffuse transmission, diffuse and glossy reflection. Energy-bounded and reciprocal by construction.";
     const RECIPROCAL: bool = true;
@@ -193,8 +206,9 @@ impl Model for Sheet {
         s[INV_MEAN_COVER] = weave::mean_cover(s[GAMMA_WARP], s[GAMMA_WEFT], s[SECTION])
             .max(R::of(1e-6))
             .recip();
-        s[ALPHA_MEAN] = (s[ALPHA_X] * s[ALPHA_Y]).max(R::of(1e-8)).sqrt();
-        s[INV_MEAN_LOSS] = albedo::ggx_mean_loss(s[ALPHA_MEAN])
+        let c = albedo::loss_coefficients(s[ALPHA_X], s[ALPHA_Y]);
+        s[LOSS..].copy_from_slice(&c);
+        s[INV_MEAN_LOSS] = albedo::mean_lobe_loss(s[ALPHA_X], s[ALPHA_Y], c)
             .max(R::of(1e-6))
             .recip();
     }
@@ -211,12 +225,17 @@ impl Model for Sheet {
         let lobe = ggx::lobe(lu, vu, ax, ay);
         let back = loss(s, l) * loss(s, v) * s[INV_MEAN_LOSS] * R::of(1.0 / PI);
         let fresnel = fresnel::schlick(lu.dot((lu + vu).normalize()), s[F0]);
-        let cover = cover_l.min(cover_v);
+        let least = least_cover(s);
+        let tilted = (cover_l - least).pos() * (cover_v - least).pos() * inv_tilted_cover(s, least);
         let mut b = [R::zero(); 8];
         b[linear::T_D] = R::select(through, diffuse, R::zero());
-        b[linear::K_T] = R::select(through, cover * (lobe + back), R::zero());
+        b[linear::K_T] = R::select(
+            through,
+            least * (lobe + back) + tilted * R::of(1.0 / PI),
+            R::zero(),
+        );
         b[linear::R_D] = R::select(through, R::zero(), diffuse);
-        b[linear::K_R] = R::select(through, R::zero(), cover * lobe * fresnel);
+        b[linear::K_R] = R::select(through, R::zero(), cover_l.min(cover_v) * lobe * fresnel);
         b
     }
 

@@ -1,7 +1,9 @@
 //! The gap: how much of the light passes between the yarns, for every direction.
 
 use crate::real::Real;
+use crate::term::albedo::GAUSS8;
 use crate::vec3::Vec3;
+use std::f64::consts::FRAC_PI_2;
 
 /// Share of a beam along `w` that passes between the yarns of a weave, uncoloured and undeviated.
 ///
@@ -23,22 +25,24 @@ pub fn openness<R: Real>(gamma_warp: R, gamma_weft: R, section: R, w: Vec3<R>) -
 
 /// The yarn's share averaged over the cosine-weighted hemisphere: (1/π) ∫ (1 - openness) cosθ dω.
 ///
-/// 16 × 16 midpoints over (sin²θ, φ) of one quadrant: within 5e-4 of the converged value, also with the kinks of
-/// cut-off angles.
+/// Eight Gauss points in cosθ on each of three panels, narrower towards grazing where a sparse weave closes, times ten
+/// azimuths of one quadrant: within 6e-4 of the converged value, relative, also with the kinks of cut-off angles.
 pub fn mean_cover<R: Real>(gamma_warp: R, gamma_weft: R, section: R) -> R {
-    const N: usize = 16;
+    const PANELS: [(f64, f64); 3] = [(0.0, 0.15), (0.15, 0.45), (0.45, 1.0)];
+    const AZIMUTHS: usize = 10;
     let mut sum = R::zero();
-    for i in 0..N {
-        let sin2 = (i as f64 + 0.5) / N as f64;
-        for j in 0..N {
-            let phi = (j as f64 + 0.5) / N as f64 * std::f64::consts::FRAC_PI_2;
-            let w = Vec3::new(
-                sin2.sqrt() * phi.cos(),
-                sin2.sqrt() * phi.sin(),
-                (1.0 - sin2).sqrt(),
-            );
-            sum = sum + openness(gamma_warp, gamma_weft, section, w.cast()).one_minus();
+    for (lo, hi) in PANELS {
+        for (x, weight) in GAUSS8 {
+            let cos = lo + (hi - lo) * x;
+            let sin = (1.0 - cos * cos).sqrt();
+            let mut ring = R::zero();
+            for j in 0..AZIMUTHS {
+                let phi = (j as f64 + 0.5) / AZIMUTHS as f64 * FRAC_PI_2;
+                let w = Vec3::new(sin * phi.cos(), sin * phi.sin(), cos);
+                ring = ring + openness(gamma_warp, gamma_weft, section, w.cast()).one_minus();
+            }
+            sum = sum + ring * R::of(2.0 * cos * weight * (hi - lo) / AZIMUTHS as f64);
         }
     }
-    sum * R::of(1.0 / (N * N) as f64)
+    sum
 }

@@ -36,14 +36,20 @@ pub fn pdf<R: Real>(l: Vec3<R>, v: Vec3<R>, ax: R, ay: R) -> R {
     d(h, ax, ay) * g1(v, ax, ay) / (v.z * R::of(4.0)).max(R::of(1e-7))
 }
 
-/// Mirrors `v` (z > 0) at a visible normal; spherical caps after Dupuy and Benyoub 2023. May point below z = 0.
+/// A normal visible from `v` (z > 0), density D G1(v) (v·h)/(n·v); spherical caps after Dupuy and Benyoub 2023.
 #[inline(always)]
-pub fn sample<R: Real>(v: Vec3<R>, ax: R, ay: R, u1: R, u2: R) -> Vec3<R> {
+pub fn visible_normal<R: Real>(v: Vec3<R>, ax: R, ay: R, u1: R, u2: R) -> Vec3<R> {
     let std = Vec3::new(v.x * ax, v.y * ay, v.z).normalize();
     let phi = u1 * R::of(2.0 * PI);
     let z = u2.one_minus() * (R::one() + std.z) - std.z;
     let sin = z.sqr().one_minus().sqrt_pos();
     let cap = Vec3::new(sin * phi.cos(), sin * phi.sin(), z) + std;
-    let h = Vec3::new(cap.x * ax, cap.y * ay, cap.z.max(R::of(1e-6))).normalize();
+    Vec3::new(cap.x * ax, cap.y * ay, cap.z.max(R::of(1e-6))).normalize()
+}
+
+/// Mirrors `v` (z > 0) at a [`visible_normal`]. May point below z = 0.
+#[inline(always)]
+pub fn sample<R: Real>(v: Vec3<R>, ax: R, ay: R, u1: R, u2: R) -> Vec3<R> {
+    let h = visible_normal(v, ax, ay, u1, u2);
     h * (v.dot(h) * R::of(2.0)) - v
 }

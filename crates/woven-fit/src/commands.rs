@@ -95,6 +95,9 @@ struct FitArgs {
     /// Weight each value with the cosine of its outgoing angle.
     #[arg(long)]
     cos_weight: bool,
+    /// Cross-validate over incidences also for matrices of thousands of values (takes five times as long).
+    #[arg(long)]
+    cv: bool,
     /// Starts per model.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=4096))]
     starts: u16,
@@ -155,6 +158,7 @@ fn fit(args: &FitArgs) -> Result<()> {
         starts: usize::from(args.starts),
         loss: args.loss,
         cosine_weights: args.cos_weight,
+        cross_validate: args.cv,
     };
     models_named(options.models.as_deref())?;
     if let Some(out) = &args.out {

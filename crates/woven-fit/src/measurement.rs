@@ -52,6 +52,24 @@ pub struct Point {
     pub nodes: (usize, usize),
 }
 
+impl Point {
+    /// Whether straight-through light of a gap is part of the value.
+    pub fn is_peak(&self) -> bool {
+        self.gap_density > 0.0
+    }
+}
+
+impl Points {
+    /// The points that `keep` wants, with all nodes and incidences.
+    pub fn filter(&self, keep: impl Fn(&Point) -> bool) -> Self {
+        Self {
+            points: self.points.iter().filter(|p| keep(p)).copied().collect(),
+            nodes: self.nodes.clone(),
+            incidences: self.incidences.clone(),
+        }
+    }
+}
+
 /// Points and their kernels.
 #[derive(Clone, Debug, Default)]
 pub struct Points {

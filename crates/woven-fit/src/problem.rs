@@ -100,6 +100,8 @@ pub struct Spec {
     pub shape: Vec<f64>,
     /// Whether light passes through gaps: by the model itself (`sheet`) or added to it.
     pub gap: bool,
+    /// (gamma_warp, gamma_weft, section) of an added gap where they are not free.
+    pub held_gap: [f64; 3],
 }
 
 /// Names of the terms that do not depend on the direction.
@@ -202,6 +204,7 @@ impl Spec {
             coordinates,
             shape: model.shape().map(|p| p.start).collect(),
             gap,
+            held_gap: [0.0; 3],
         }
     }
 
@@ -239,7 +242,7 @@ impl Spec {
     /// Shape values and gap values for solver coordinates `x`.
     pub fn shape_at(&self, x: &[f64]) -> (Vec<f64>, [f64; 3]) {
         let mut shape = self.shape.clone();
-        let mut gap = [0.0; 3];
+        let mut gap = self.held_gap;
         for (c, &x) in self.coordinates.iter().zip(x) {
             let value = if c.log { x.exp() } else { x };
             match c.place {
@@ -275,6 +278,27 @@ impl Spec {
                 }
             })
             .collect()
+    }
+
+    /// Whether coordinate `c` makes the gap.
+    pub fn is_gap(&self, c: usize) -> bool {
+        GAP.contains(&self.coordinates[c].name)
+    }
+
+    /// The same with the gap held at (gamma_warp, gamma_weft, section).
+    pub fn holding_gap(&self, gap: [f64; 3]) -> Self {
+        let mut spec = self.clone();
+        for (c, coordinate) in self.coordinates.iter().enumerate() {
+            let Some(i) = GAP.iter().position(|g| *g == coordinate.name) else {
+                continue;
+            };
+            if let Place::Shape(place) = self.coordinates[c].place {
+                spec.shape[place] = gap[i];
+            }
+        }
+        spec.held_gap = gap;
+        spec.coordinates.retain(|c| !GAP.contains(&c.name));
+        spec
     }
 
     /// Factors that are not free and not zero: (number, value).

@@ -118,7 +118,8 @@ impl Bvh {
     /// The box of a child: of its triangles, or of the four boxes of its node.
     fn child_bounds(&self, child: u32, corners: &[Corners]) -> Aabb {
         if child == EMPTY {
-            return Aabb::INVALID;
+            // A box that no ray meets, without infinities.
+            return Aabb { min: Vec3A::splat(1e30), max: Vec3A::splat(-1e30) };
         }
         if child & LEAF != 0 {
             let first = (child & !LEAF) as usize * 4;

@@ -1,32 +1,159 @@
-//! The path tracer on a GPU, by wgpu. Being written.
+//! The path tracer on a GPU by wgpu compute: the same picture as [`crate::render::Backend::Cpu`], from the same
+//! random numbers. wgpu is named in this folder only.
 
-use crate::accumulate::Accumulation;
+mod buffers;
+mod device;
+mod pipeline;
+
+pub use device::{Adapter, adapters};
+pub use pipeline::source;
+
+use anyhow::{Result, bail, ensure};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::accumulate::{Accumulation, PixelSum};
 use crate::cpu::path::View;
 use crate::table::Table;
-use anyhow::{Result, bail};
-use std::sync::atomic::AtomicBool;
+use buffers::Buffers;
+pub use buffers::Frame;
+use device::Device;
+use pipeline::Pipeline;
 
-pub(crate) struct Gpu {}
+/// A submit should take about this long: short beside a desktop's watchdog and its screen, long beside the cost of a
+/// submit.
+const AIM: Duration = Duration::from_millis(50);
+/// No submit should take longer.
+const LIMIT: Duration = Duration::from_millis(200);
+/// A device that does not answer for this long is lost.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A device with a scene on it.
+pub(crate) struct Gpu {
+    device: Device,
+    pipeline: Pipeline,
+    buffers: Buffers,
+    globals: crate::table::Globals,
+    samples: u32,
+    width: u32,
+    height: u32,
+    /// Pixel samples that one submit is given now, in blocks of 64.
+    load: u32,
+    /// The longest submit so far.
+    longest: Duration,
+}
+
 impl Gpu {
-    pub(crate) fn new(_t: &Table, _v: &View, _software: bool) -> Result<Self> {
-        bail!("no GPU backend yet")
+    /// Sets up a device, compiles the shader and uploads the scene. Without `software`, a software adapter is no GPU.
+    pub(crate) fn new(table: &Table, view: &View, software: bool) -> Result<Self> {
+        let device = Device::open(software)?;
+        let pipeline = device.guarded("compiling the shader", || Pipeline::new(&device.device))?;
+        let buffers = Buffers::new(&device, &pipeline, table, view)?;
+        Ok(Self {
+            device,
+            pipeline,
+            buffers,
+            globals: table.globals,
+            samples: 0,
+            width: view.width,
+            height: view.height,
+            load: 16,
+            longest: Duration::ZERO,
+        })
     }
+
     pub(crate) fn name(&self) -> &str {
-        ""
+        &self.device.name
     }
+
     pub(crate) fn samples(&self) -> u32 {
-        0
+        self.samples
     }
-    pub(crate) fn step(&mut self, _v: &View, _count: u32, _stop: &AtomicBool) -> Result<bool> {
-        bail!("no GPU backend yet")
+
+    /// The longest time that a single submit has taken.
+    pub(crate) fn longest(&self) -> Duration {
+        self.longest
     }
-    pub(crate) fn restore(&mut self, _s: &Accumulation) -> Result<()> {
+
+    /// Adds `count` samples to every pixel, in submits of about [`AIM`].
+    pub(crate) fn step(&mut self, view: &View, count: u32, stop: &AtomicBool) -> Result<bool> {
+        let blocks = self.width.div_ceil(8) * self.height.div_ceil(8);
+        // A pass gives every pixel the same number of samples; it is cut into ranges of blocks.
+        let mut done = 0;
+        while done < count {
+            // Only between passes: the samples of a broken one could not be taken back on the device.
+            if stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            let together = (self.load / blocks).clamp(1, count - done);
+            let mut block = 0;
+            while block < blocks {
+                let range = (self.load / together).clamp(1, blocks - block).min(self.device.max_groups);
+                let frame = Frame::new(view, &self.globals, self.samples, together, block, range);
+                let began = Instant::now();
+                self.submit(&frame, range)?;
+                self.adapt(began.elapsed(), together * range);
+                block += range;
+            }
+            done += together;
+            self.samples += together;
+        }
+        Ok(true)
+    }
+
+    fn submit(&self, frame: &Frame, groups: u32) -> Result<()> {
+        let (device, queue) = (&self.device.device, &self.device.queue);
+        queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(frame));
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("samples") });
+        {
+            let mut pass =
+                encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("path"), timestamp_writes: None });
+            pass.set_pipeline(&self.pipeline.pipeline);
+            pass.set_bind_group(0, &self.buffers.group, &[]);
+            pass.dispatch_workgroups(groups, 1, 1);
+        }
+        let index = queue.submit([encoder.finish()]);
+        self.device.wait(index, PATIENCE)
+    }
+
+    /// Sizes the next submit by the time of the last.
+    fn adapt(&mut self, took: Duration, load: u32) {
+        self.longest = self.longest.max(took);
+        let ratio = AIM.as_secs_f64() / took.as_secs_f64().max(1e-5);
+        self.load = if took > LIMIT {
+            (load / 2).max(1)
+        } else {
+            // At most twice as much at once: neighbouring parts of a picture differ in cost.
+            ((f64::from(load) * ratio.min(2.0)) as u32).clamp(1, 1 << 24)
+        };
+    }
+
+    /// Puts sums on the device, to go on from them.
+    pub(crate) fn restore(&mut self, sums: &Accumulation) -> Result<()> {
+        ensure!(
+            (sums.width, sums.height) == (self.width, self.height),
+            "the sums have another size than the picture; start the render anew"
+        );
+        self.device.queue.write_buffer(&self.buffers.sums, 0, bytemuck::cast_slice(&sums.pixels));
+        self.samples = sums.samples;
+        self.device.check()
+    }
+
+    /// Reads the sums back.
+    pub(crate) fn read(&self, sums: &mut Accumulation) -> Result<()> {
+        let bytes = self.device.read(&self.buffers.sums)?;
+        let size = sums.pixels.len() * size_of::<PixelSum>();
+        if bytes.len() < size {
+            bail!("the GPU gave {} bytes back instead of {size}", bytes.len());
+        }
+        sums.pixels = bytes[..size].chunks_exact(size_of::<PixelSum>()).map(bytemuck::pod_read_unaligned).collect();
+        sums.samples = self.samples;
         Ok(())
     }
-    pub(crate) fn read(&mut self, _s: &mut Accumulation) -> Result<()> {
-        Ok(())
-    }
-    pub(crate) fn moved(&mut self, _t: &Table) -> Result<()> {
-        Ok(())
+
+    /// A mesh has moved: uploads the table anew, keeping device and pipeline.
+    pub(crate) fn moved(&mut self, table: &Table) -> Result<()> {
+        self.globals = table.globals;
+        self.buffers.update(&self.device, &self.pipeline, table)
     }
 }

@@ -180,6 +180,15 @@ impl Renderer {
         self.note.as_deref()
     }
 
+    /// The longest time that one submit to the GPU has taken; nothing on the CPU.
+    #[must_use]
+    pub fn longest_submit(&self) -> Option<Duration> {
+        match &self.engine {
+            Engine::Cpu => None,
+            Engine::Gpu(gpu) => Some(gpu.longest()),
+        }
+    }
+
     /// The settings.
     #[must_use]
     pub fn settings(&self) -> &Settings {
@@ -195,19 +204,20 @@ impl Renderer {
         }
     }
 
-    /// Gathers `count` more samples of every pixel. Returns false when `stop` was set meanwhile; the samples of this
-    /// step are then not counted.
+    /// Gathers `count` more samples of every pixel. Returns false when `stop` was set meanwhile; samples that
+    /// not every pixel has got are then not counted.
     ///
     /// # Errors
     /// When the GPU fails and the CPU cannot go on in its place.
     pub fn step(&mut self, count: u32, stop: &AtomicBool) -> Result<bool> {
         let view = view(&self.table, &self.settings);
+        let before = self.samples();
         if let Engine::Gpu(gpu) = &mut self.engine {
             match gpu.step(&view, count, stop) {
                 Ok(done) => return Ok(done),
                 Err(why) => {
                     // What was gathered since the last read-back is gathered again, on a fresh device or the CPU.
-                    let goal = gpu.samples() + count;
+                    let goal = before + count;
                     self.recover(&why, goal, stop)?;
                     return Ok(self.samples() >= goal);
                 }

@@ -4,6 +4,10 @@
 //! Lengths are metres, +Y is up, angles radians, colours linear Rec.709, light is radiance [W/(sr m²)]
 //! per channel unless a field says otherwise.
 
+pub mod environment;
+pub mod gltf;
+pub mod sky;
+
 use glam::{Mat4, Vec2, Vec3};
 
 /// Number of shape numbers of a sheet: its parameters, then the constants derived from them.

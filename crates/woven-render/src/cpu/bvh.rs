@@ -10,6 +10,9 @@ use crate::table::Table;
 /// Below this product a shadow ray goes on only by a fair coin at each further sheet.
 pub(crate) const FAINT: f32 = 1e-3;
 
+/// Farther than anything.
+pub(crate) const FAR: f32 = 3.0e38;
+
 /// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hit {

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use super::bvh::{FAINT, Ray, nearest, transmittance};
+use super::bvh::{FAINT, FAR, Ray, nearest, transmittance};
 use super::light::{self, Place};
 use super::math::luminance;
 use super::surface::{self, Surface};
@@ -139,7 +139,7 @@ pub(crate) fn sample(table: &Table, view: &View, x: u32, y: u32, index: u32) -> 
     let mut all_weights = 0.0;
     let mut pick = rng.coin();
     for crossing in 0..CROSSINGS {
-        let Some(hit) = nearest(table, &ray, tmin, f32::INFINITY) else {
+        let Some(hit) = nearest(table, &ray, tmin, FAR) else {
             add(
                 &mut out.light,
                 table.globals.sky_layer,
@@ -253,7 +253,7 @@ fn follow(table: &Table, view: &View, mut v: Vertex, rng: &mut Rng, light: &mut 
         let mut tmin = 0.0;
         // Straight on through gaps, each by a coin.
         let (hit, s) = loop {
-            let Some(hit) = nearest(table, &ray, tmin, f32::INFINITY) else {
+            let Some(hit) = nearest(table, &ray, tmin, FAR) else {
                 let sky = table.globals.sky_light;
                 if sky != NONE {
                     let met = light::density(table, &v.at, sky, d, 1e9);

@@ -1,0 +1,396 @@
+// Choosing a light and a direction to it, and the density of that; the pair of cpu/light.rs.
+
+const WEIGHED: u32 = 16u;
+
+struct Place {
+    p: vec3<f32>,
+    n: vec3<f32>,
+    transmits: bool,
+    inside: bool,
+    total: f32,
+}
+
+struct LightSample {
+    wi: vec3<f32>,
+    distance: f32,
+    radiance: vec3<f32>,
+    // 0: nothing was found.
+    pdf: f32,
+    layer: u32,
+    meets: bool,
+    sampled_by_all: bool,
+}
+
+fn light_place(p: vec3<f32>, n: vec3<f32>, transmits: bool) -> Place {
+    let first = frame.globals.lights;
+    var inside = frame.globals.portals > 0u;
+    for (var i = 0u; i < frame.globals.portals; i++) {
+        inside = inside && dot(p - lights[first + i].p, lights[first + i].n) > 0.0;
+    }
+    var place = Place(p, n, transmits, inside, 0.0);
+    if (first > WEIGHED) {
+        place.total = 1.0;
+    } else {
+        for (var i = 0u; i < first; i++) {
+            place.total += light_weight(place, i);
+        }
+    }
+    return place;
+}
+
+fn light_weight(at: Place, i: u32) -> f32 {
+    let lum = luminance(lights[i].radiance);
+    let n = lights[i].n;
+    let kind = lights[i].kind;
+    if (kind == RECT || kind == TRIANGLE) {
+        let half = select(1.0 / 3.0, 0.5, kind == RECT);
+        let to = lights[i].p + (lights[i].u + lights[i].v) * half - at.p;
+        let two = (materials[shades[lights[i].place].material].flags & DOUBLE_SIDED) != 0u;
+        if (!two && dot(at.p - lights[i].p, n) <= 0.0) {
+            return 0.0;
+        }
+        let d2 = max(length2(to), 1e-12);
+        let c = abs(dot(to, n)) / sqrt(d2);
+        let area = abs(lights[i].area);
+        return lum * area * (0.1 + 0.9 * c) / (d2 + 0.5 * area);
+    }
+    if (kind == SUN) {
+        let c = dot(n, at.n);
+        let reach = c + lights[i].u.y;
+        if (!at.transmits && reach <= 0.0) {
+            return 0.0;
+        }
+        if (at.inside && !leads_out(at.p, n, lights[i].u.y)) {
+            return 0.0;
+        }
+        return lum * max(abs(c), 0.05);
+    }
+    if (kind == SKY) {
+        var angle = PI;
+        if (at.inside) {
+            angle = windows(at.p);
+        }
+        return frame.globals.sky_scale.w * angle;
+    }
+    return lum / max(length2(lights[i].p - at.p), 1e-6);
+}
+
+fn leads_out(p: vec3<f32>, d: vec3<f32>, spread: f32) -> bool {
+    let first = frame.globals.lights;
+    for (var i = 0u; i < frame.globals.portals; i++) {
+        let r = first + i;
+        let along = dot(d, lights[r].n);
+        if (along > -1e-4) {
+            continue;
+        }
+        let t = dot(lights[r].p - p, lights[r].n) / along;
+        let q = p + d * t - lights[r].p;
+        let lu = sqrt(length2(lights[r].u));
+        let lv = sqrt(length2(lights[r].v));
+        let slack = 1e-3 + 2.0 * spread * t / abs(along);
+        let a = dot(q, lights[r].u) / lu;
+        let b = dot(q, lights[r].v) / lv;
+        let skew = select(0.0, lu + lv, lights[r].area < 0.0);
+        if (a > -slack - skew && b > -slack - skew && a < lu + slack + skew && b < lv + slack + skew) {
+            return true;
+        }
+    }
+    return false;
+}
+
+fn window(r: u32, p: vec3<f32>) -> f32 {
+    let to = lights[r].p + (lights[r].u + lights[r].v) * 0.5 - p;
+    let d2 = max(length2(to), 1e-12);
+    let area = abs(lights[r].area);
+    return area * (0.05 + 0.95 * abs(dot(to, lights[r].n)) / sqrt(d2)) / (d2 + 0.25 * area);
+}
+
+fn windows(p: vec3<f32>) -> f32 {
+    let first = frame.globals.lights;
+    var sum = 0.0;
+    for (var i = 0u; i < frame.globals.portals; i++) {
+        sum += window(first + i, p);
+    }
+    return sum;
+}
+
+fn no_light() -> LightSample {
+    return LightSample(vec3<f32>(0.0, 0.0, 1.0), 1.0, vec3<f32>(0.0), 0.0, 0u, false, false);
+}
+
+fn light_sample(at: Place, u: vec3<f32>) -> LightSample {
+    let count = frame.globals.lights;
+    if (count == 0u || at.total <= 0.0) {
+        return no_light();
+    }
+    var chosen = NONE;
+    var share = 0.0;
+    var rest = u.x * at.total;
+    if (count > WEIGHED) {
+        var lo = 0u;
+        var hi = count - 1u;
+        while (lo < hi) {
+            let middle = (lo + hi) / 2u;
+            if (lights[middle].cumulative > u.x) {
+                hi = middle;
+            } else {
+                lo = middle + 1u;
+            }
+        }
+        chosen = lo;
+        share = power_share(lo);
+    } else {
+        for (var i = 0u; i < count; i++) {
+            let w = light_weight(at, i);
+            if (w > 0.0) {
+                chosen = i;
+                share = w / at.total;
+                if (rest < w) {
+                    break;
+                }
+            }
+            rest -= w;
+        }
+    }
+    if (chosen == NONE || share <= 0.0) {
+        return no_light();
+    }
+    return light_towards(at, chosen, share, u.y, u.z);
+}
+
+fn soft(i: u32) -> bool {
+    return lights[i].kind == TRIANGLE || (lights[i].kind == RECT && lights[i].area < 0.0);
+}
+
+fn power_share(i: u32) -> f32 {
+    var before = 0.0;
+    if (i > 0u) {
+        before = lights[i - 1u].cumulative;
+    }
+    return lights[i].cumulative - before;
+}
+
+fn light_towards(at: Place, i: u32, share: f32, u: f32, v: f32) -> LightSample {
+    let n = lights[i].n;
+    let layer = lights[i].layer;
+    let kind = lights[i].kind;
+    if (kind == RECT || kind == TRIANGLE) {
+        let triangle = kind == TRIANGLE;
+        var a = u;
+        var b = v;
+        if (triangle && a + b > 1.0) {
+            a = 1.0 - a;
+            b = 1.0 - b;
+        }
+        var t: Towards;
+        if (triangle) {
+            t = triangle_sample(i, at.p, a, b);
+        } else {
+            t = rect_sample(i, at.p, a, b);
+        }
+        let two = (materials[shades[lights[i].place].material].flags & DOUBLE_SIDED) != 0u;
+        if (t.pdf <= 0.0 || (!two && dot(t.d, n) >= 0.0)) {
+            return no_light();
+        }
+        var radiance = lights[i].radiance;
+        if (triangle) {
+            radiance = emission_at(lights[i].place, a, b);
+        }
+        return LightSample(t.d, t.distance, radiance, share * t.pdf, layer, true, soft(i));
+    }
+    if (kind == SUN) {
+        let sc = sincos(TAU * v);
+        let radius = lights[i].u.y * sqrt(u);
+        let x = any_tangent(n);
+        let y = cross(n, x);
+        let wi = unit(n + (x * sc.y + y * sc.x) * radius);
+        return LightSample(wi, 1e9, lights[i].radiance, share, layer, false, false);
+    }
+    if (kind == SKY) {
+        let wi = sky_sample(at, u, v);
+        let pdf = sky_density(at, wi);
+        if (pdf <= 0.0) {
+            return no_light();
+        }
+        return LightSample(wi, 1e9, sky(wi), share * pdf, layer, true, false);
+    }
+    let to = lights[i].p - at.p;
+    let distance = max(sqrt(length2(to)), 1e-6);
+    let wi = to * (1.0 / distance);
+    var radiance = lights[i].radiance * (1.0 / (distance * distance));
+    if (kind == SPOT) {
+        let t = clamp((-dot(wi, n) - lights[i].v.y) / (lights[i].v.x - lights[i].v.y), 0.0, 1.0);
+        radiance *= t * t * (3.0 - 2.0 * t);
+    }
+    return LightSample(wi, distance, radiance, share, layer, false, false);
+}
+
+fn light_density(at: Place, i: u32, wi: vec3<f32>, distance: f32) -> f32 {
+    if (at.total <= 0.0) {
+        return 0.0;
+    }
+    var share: f32;
+    if (frame.globals.lights > WEIGHED) {
+        share = power_share(i);
+    } else {
+        share = light_weight(at, i) / at.total;
+    }
+    if (share <= 0.0) {
+        return 0.0;
+    }
+    let kind = lights[i].kind;
+    if (kind == RECT || kind == TRIANGLE) {
+        return share * rect_density(i, at.p, wi, distance, kind == TRIANGLE);
+    }
+    if (kind == SKY) {
+        return share * sky_density(at, wi);
+    }
+    return 0.0;
+}
+
+fn sky_uv(d: vec3<f32>) -> vec2<f32> {
+    let c = frame.globals.sky_turn.x;
+    let s = frame.globals.sky_turn.y;
+    let x = d.x * c - d.z * s;
+    let z = d.x * s + d.z * c;
+    return vec2<f32>(0.5 + arc2(x, -z) * (1.0 / TAU), arc_cos(d.y) * (1.0 / PI));
+}
+
+fn sky_pixel(x: i32, y: i32) -> vec3<f32> {
+    let w = i32(frame.globals.sky_width);
+    let h = i32(frame.globals.sky_height);
+    return skies[clamp(y, 0, h - 1) * w + (x + w) % w].xyz;
+}
+
+fn sky(d: vec3<f32>) -> vec3<f32> {
+    if (frame.globals.sky_width == 0u) {
+        return vec3<f32>(0.0);
+    }
+    let uv = sky_uv(d);
+    let x = uv.x * f32(frame.globals.sky_width) - 0.5;
+    let y = uv.y * f32(frame.globals.sky_height) - 0.5;
+    let x0 = floor(x);
+    let y0 = floor(y);
+    let i = i32(x0);
+    let j = i32(y0);
+    let c00 = sky_pixel(i, j);
+    let c01 = sky_pixel(i, j + 1);
+    let top = c00 + (sky_pixel(i + 1, j) - c00) * (x - x0);
+    let low = c01 + (sky_pixel(i + 1, j + 1) - c01) * (x - x0);
+    return (top + (low - top) * (y - y0)) * frame.globals.sky_scale.xyz;
+}
+
+fn sky_sample(at: Place, u1: f32, v: f32) -> vec3<f32> {
+    let first = frame.globals.lights;
+    let portal_share = frame.globals.portal_share;
+    var u = u1;
+    if (at.inside && u < portal_share) {
+        u = min(u / portal_share, 0.99999994);
+        var rest = u * windows(at.p);
+        var chosen = first;
+        var w = 1.0;
+        for (var i = 0u; i < frame.globals.portals; i++) {
+            chosen = first + i;
+            w = window(chosen, at.p);
+            if (rest < w || i + 1u == frame.globals.portals) {
+                break;
+            }
+            rest -= w;
+        }
+        return rect_sample(chosen, at.p, clamp(rest / w, 0.0, 1.0), v).d;
+    }
+    if (at.inside) {
+        u = min((u - portal_share) / max(1.0 - portal_share, 1e-6), 0.99999994);
+    }
+    return picture_sample(u, v);
+}
+
+fn find_column(first: u32, count: u32, u: f32) -> u32 {
+    var lo = 0u;
+    var hi = count - 1u;
+    while (lo < hi) {
+        let middle = (lo + hi) / 2u;
+        if (skies[first + middle].w > u) {
+            hi = middle;
+        } else {
+            lo = middle + 1u;
+        }
+    }
+    return lo;
+}
+
+fn find_row(first: u32, count: u32, u: f32) -> u32 {
+    var lo = 0u;
+    var hi = count - 1u;
+    while (lo < hi) {
+        let middle = (lo + hi) / 2u;
+        if (skies[first + middle].x > u) {
+            hi = middle;
+        } else {
+            lo = middle + 1u;
+        }
+    }
+    return lo;
+}
+
+fn row_before(y: u32) -> f32 {
+    if (y == 0u) {
+        return 0.0;
+    }
+    return skies[frame.globals.sky_width * frame.globals.sky_height + y - 1u].x;
+}
+
+fn column_before(x: u32, y: u32) -> f32 {
+    if (x == 0u) {
+        return 0.0;
+    }
+    return skies[y * frame.globals.sky_width + x - 1u].w;
+}
+
+fn picture_sample(u: f32, v: f32) -> vec3<f32> {
+    let w = frame.globals.sky_width;
+    let h = frame.globals.sky_height;
+    let y = find_row(w * h, h, v);
+    let x = find_column(y * w, w, u);
+    let by = row_before(y);
+    let fy = clamp((v - by) / (skies[w * h + y].x - by), 0.0, 1.0);
+    let bx = column_before(x, y);
+    let fx = clamp((u - bx) / (skies[y * w + x].w - bx), 0.0, 1.0);
+    let theta = sincos(PI * (f32(y) + fy) / f32(h));
+    let phi = sincos(TAU * ((f32(x) + fx) / f32(w) - 0.5));
+    let lx = theta.x * phi.x;
+    let lz = -theta.x * phi.y;
+    let c = frame.globals.sky_turn.x;
+    let s = frame.globals.sky_turn.y;
+    return unit(vec3<f32>(lx * c + lz * s, theta.y, lz * c - lx * s));
+}
+
+fn sky_density(at: Place, d: vec3<f32>) -> f32 {
+    let first = frame.globals.lights;
+    let portal_share = frame.globals.portal_share;
+    var pdf = 0.0;
+    var picture = 1.0;
+    if (at.inside) {
+        picture = 1.0 - portal_share;
+        let all = windows(at.p);
+        for (var i = 0u; i < frame.globals.portals; i++) {
+            let r = first + i;
+            let t = crossing(r, at.p, d);
+            if (t > 0.0) {
+                pdf += portal_share * window(r, at.p) / all * rect_density(r, at.p, d, t, false);
+            }
+        }
+    }
+    if (picture > 0.0) {
+        let w = frame.globals.sky_width;
+        let h = frame.globals.sky_height;
+        let uv = sky_uv(d);
+        let x = min(u32(max(uv.x * f32(w), 0.0)), w - 1u);
+        let y = min(u32(max(uv.y * f32(h), 0.0)), h - 1u);
+        let row = skies[w * h + y].x - row_before(y);
+        let column = skies[y * w + x].w - column_before(x, y);
+        let sin_theta = sqrt(max(1.0 - d.y * d.y, 1e-8));
+        pdf += picture * row * column * f32(w * h) / (2.0 * PI * PI * sin_theta);
+    }
+    return pdf;
+}

@@ -1,0 +1,134 @@
+// The table's rows and the frame's numbers; the pair of table.rs and gpu/buffers.rs. A test compares the offsets.
+
+const NONE: u32 = 0xffffffffu;
+const EMPTY: u32 = 0xffffffffu;
+const LEAF: u32 = 0x80000000u;
+const STACK: u32 = 64u;
+const LAYERS: u32 = 4u;
+const PI: f32 = 3.14159265358979;
+const TAU: f32 = 6.28318530717959;
+const FRAC_PI_2: f32 = 1.57079632679490;
+const FRAC_PI_4: f32 = 0.785398163397448;
+const FRAC_1_PI: f32 = 0.318309886183791;
+const FAR: f32 = 3.0e38;
+
+// MaterialRow.flags
+const MATT: u32 = 1u;
+const DOUBLE_SIDED: u32 = 2u;
+const TRANSMITS: u32 = 4u;
+const EMITS: u32 = 8u;
+const EVEN: u32 = 16u;
+
+// LightRow.kind
+const RECT: u32 = 0u;
+const TRIANGLE: u32 = 1u;
+const SUN: u32 = 2u;
+const POINT: u32 = 3u;
+const SPOT: u32 = 4u;
+const SKY: u32 = 5u;
+
+struct Node {
+    lo: array<vec4<f32>, 3>,
+    hi: array<vec4<f32>, 3>,
+    child: vec4<u32>,
+}
+
+struct Packet {
+    v0: array<vec4<f32>, 3>,
+    e1: array<vec4<f32>, 3>,
+    e2: array<vec4<f32>, 3>,
+    gap: vec4<f32>,
+}
+
+struct Shade {
+    n0: vec4<f32>,
+    n1: vec4<f32>,
+    n2: vec4<f32>,
+    weft: vec4<f32>,
+    v: vec4<f32>,
+    material: u32,
+    light: u32,
+    mesh: u32,
+    triangle: u32,
+}
+
+struct MaterialRow {
+    linear: array<vec4<f32>, 8>,
+    shape: array<f32, 16>,
+    weights: array<f32, 8>,
+    emission: vec4<f32>,
+    flags: u32,
+    layer: u32,
+    color_texture: u32,
+    coverage_texture: u32,
+    emission_texture: u32,
+    alpha_cutoff: f32,
+    gap: f32,
+    cover: f32,
+}
+
+struct LightRow {
+    p: vec3<f32>,
+    kind: u32,
+    u: vec3<f32>,
+    layer: u32,
+    v: vec3<f32>,
+    place: u32,
+    n: vec3<f32>,
+    area: f32,
+    radiance: vec3<f32>,
+    cumulative: f32,
+}
+
+struct Globals {
+    sky_scale: vec4<f32>,
+    lights: u32,
+    portals: u32,
+    sky_width: u32,
+    sky_height: u32,
+    sky_turn: vec2<f32>,
+    portal_share: f32,
+    sky_light: u32,
+    sky_layer: u32,
+    soft_lights: u32,
+    offset: f32,
+    pad: u32,
+}
+
+struct Frame {
+    eye: vec3<f32>,
+    aperture: f32,
+    right: vec3<f32>,
+    focus: f32,
+    up: vec3<f32>,
+    width: u32,
+    forward: vec3<f32>,
+    height: u32,
+    lens_x: vec3<f32>,
+    depth: u32,
+    lens_y: vec3<f32>,
+    seed: u32,
+    // First sample and how many, first block of 8 x 8 pixels and how many.
+    first: u32,
+    count: u32,
+    block: u32,
+    blocks: u32,
+    globals: Globals,
+}
+
+struct PixelSum {
+    light: array<vec4<f32>, 4>,
+    albedo: vec4<f32>,
+    normal: vec4<f32>,
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> nodes: array<Node>;
+@group(0) @binding(2) var<storage, read> packets: array<Packet>;
+@group(0) @binding(3) var<storage, read> shades: array<Shade>;
+@group(0) @binding(4) var<storage, read> materials: array<MaterialRow>;
+// Rows of textures, TEXTURE_ROW words each, then the texels.
+@group(0) @binding(5) var<storage, read> texels: array<u32>;
+@group(0) @binding(6) var<storage, read> lights: array<LightRow>;
+@group(0) @binding(7) var<storage, read> skies: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read_write> sums: array<PixelSum>;

@@ -552,7 +552,7 @@ fn ggx_mirrored_sample(s: array<f32, 16>, w: array<f32, 8>, wo: vec3<f32>, u: ve
     return vec3<f32>(t26, t27, t28);
 }
 
-// slab: k_d/π + k_t √(T(n·l) T(n·v')) M(l, v'; α_t), T = (1-F)/(1+F), α_t = 0.836 (n-1) alpha
+// slab: k_d/π + k_t √(T(n·l) T(n·v')) M(l, v'; α_t), T = (1-F)/(1+F), α_t = 0.836 (n-1) alpha/(1 + 0.75 n alpha²)
 fn slab_basis(s: array<f32, 16>, l: vec3<f32>, v: vec3<f32>) -> array<f32, 8> {
     let t0 = abs(l.z);
     let t1 = abs(v.z);

@@ -3,6 +3,7 @@
 mod albedo;
 mod derivatives;
 mod energy;
+mod published;
 mod readers;
 mod reciprocity;
 mod sampling;

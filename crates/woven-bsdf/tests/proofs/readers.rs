@@ -21,6 +21,10 @@ fn patch_at(file: &Klems, theta_deg: f64) -> usize {
 }
 
 #[test]
+#[expect(
+    clippy::approx_constant,
+    reason = "a transmittance of 0.3180 only looks like 1/π"
+)]
 fn transmittances_of_the_shipped_files() {
     // The numbers of pywincalc 3.3.1 and of the data's own notes: τ at 0, 40, 60°, straight share at 0, hemi-hemi.
     let known = [

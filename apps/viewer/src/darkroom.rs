@@ -6,8 +6,10 @@ use std::thread::JoinHandle;
 use woven_render::denoise::{self, denoise};
 use woven_render::film::{Curve, Film};
 
-/// Half the window of the filter, in pixels: small, so that it keeps up with the renderer.
-const RADIUS: usize = 4;
+/// Half the window of the filter, in pixels, for coarse and for full pictures: small, so that it keeps up with the renderer.
+const RADII: [usize; 2] = [6, 4];
+/// Pixels of a coarse picture at most.
+const COARSE: usize = 120_000;
 
 /// A picture for the screen.
 #[derive(Clone, Debug)]
@@ -67,7 +69,8 @@ pub fn develop(film: &Film, recipe: Recipe) -> Vec<u8> {
         return film.to_rgb8(Curve::Filmic, recipe.exposure);
     }
     let mut film = film.clone();
-    denoise(&mut film, &denoise::Settings { radius: RADIUS, ..denoise::Settings::default() });
+    let radius = RADII[usize::from(film.width * film.height > COARSE)];
+    denoise(&mut film, &denoise::Settings { radius, ..denoise::Settings::default() });
     film.to_rgb8(Curve::Filmic, recipe.exposure)
 }
 

@@ -12,7 +12,7 @@ use crate::{sliders, style};
 /// Width of the right panel.
 const SIDE: f32 = 348.0;
 /// Height of the plot with its controls and numbers.
-const PLOT: f32 = 418.0;
+const PLOT: f32 = 396.0;
 
 impl Viewer {
     /// The whole window.
@@ -120,6 +120,8 @@ impl Viewer {
     }
 
     fn side(&mut self, ui: &mut Ui) {
+        // The panel is as wide as what is in it; without this it would shrink under its own contents.
+        ui.set_min_width(ui.available_width());
         let plot = Frame::new().inner_margin(Margin { top: 6, ..Margin::ZERO });
         Panel::bottom("plot").frame(plot).exact_size(PLOT.min(ui.available_height() * 0.6)).resizable(false).show(ui, |ui| {
             self.plot.show(ui, &self.cloth, self.measurement.as_ref());
@@ -167,7 +169,7 @@ impl Viewer {
                     } else if p.full {
                         "refining"
                     } else {
-                        "first look"
+                        "coarse"
                     };
                     format!("{w} × {h} · {} samples a pixel · {} samples/s · {} · {state}", p.passes, large(p.rate), p.backend)
                 }

@@ -77,23 +77,27 @@ impl PolarPlot {
 
     fn controls(&mut self, ui: &mut Ui, cloth: &Cloth) {
         ui.horizontal(|ui| {
-            ui.label(style::group("BTDF in the plane of incidence")).on_hover_text(
+            ui.label(style::group("BTDF")).on_hover_text(
                 "BSDF in 1/sr around the plane of incidence: reflection above the sheet, transmission below. \
                  Light comes along the dashed line. The gap, a delta, is the arrow below.",
             );
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let log = ui.selectable_label(self.log, "log").on_hover_text("Logarithmic radius over four decades (L)");
-                if log.clicked() {
-                    self.log = true;
+            for (log, name, about) in [(true, "log", "Logarithmic radius over four decades (L)"), (false, "linear", "Linear radius (L)")] {
+                if ui.selectable_label(self.log == log, name).on_hover_text(about).clicked() {
+                    self.log = log;
                 }
-                let linear = ui.selectable_label(!self.log, "linear").on_hover_text("Linear radius (L)");
-                if linear.clicked() {
-                    self.log = false;
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let pin = ui.button("Pin").on_hover_text("Keep this curve to compare others with it; five at most (P)");
+                if pin.clicked() {
+                    self.pin(cloth);
+                }
+                if !self.pins.is_empty() && ui.button("Clear").on_hover_text("Remove the pinned curves").clicked() {
+                    self.pins.clear();
                 }
             });
         });
         ui.horizontal(|ui| {
-            ui.spacing_mut().slider_width = 92.0;
+            ui.spacing_mut().slider_width = 100.0;
             let label = ui.label("incidence");
             ui.add(Slider::new(&mut self.theta_deg, 0.0..=80.0).suffix("°").max_decimals(1))
                 .labelled_by(label.id)
@@ -105,13 +109,6 @@ impl PolarPlot {
                 if ui.selectable_label(self.phi_deg == phi, name).on_hover_text(about).clicked() {
                     self.phi_deg = phi;
                 }
-            }
-            let pin = ui.button("Pin").on_hover_text("Keep this curve to compare others with it; five at most (P)");
-            if pin.clicked() {
-                self.pin(cloth);
-            }
-            if !self.pins.is_empty() && ui.button("Clear").on_hover_text("Remove the pinned curves").clicked() {
-                self.pins.clear();
             }
         });
     }

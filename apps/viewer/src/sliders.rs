@@ -34,7 +34,7 @@ pub fn show(ui: &mut Ui, cloth: &mut Cloth, misfit: f64) -> bool {
         }
         ui.add_space(4.0);
         ui.label(style::group(title)).on_hover_text(about);
-        Grid::new(title).num_columns(3).spacing([8.0, 4.0]).show(ui, |ui| {
+        Grid::new(title).num_columns(3).min_col_width(NAME).spacing([6.0, 4.0]).show(ui, |ui| {
             for (index, param) in cloth.params(role) {
                 changed |= row(ui, cloth, index, param);
                 ui.end_row();
@@ -74,7 +74,7 @@ fn model(ui: &mut Ui, cloth: &mut Cloth) -> bool {
         changed = true;
     }
     let equation = egui::RichText::new(format!("f = {}", cloth.model.equation)).size(11.0).color(style::WEAK);
-    ui.add(egui::Label::new(equation).wrap()).on_hover_text(cloth.model.doc);
+    ui.add(egui::Label::new(equation).truncate()).on_hover_text(format!("f = {}\n\n{}", cloth.model.equation, cloth.model.doc));
     changed
 }
 
@@ -86,7 +86,7 @@ fn row(ui: &mut Ui, cloth: &mut Cloth, index: usize, param: &'static Param) -> b
     let differs = cloth.values[index] != start;
     let name = egui::RichText::new(param.name).color(if differs { style::ACCENT } else { style::TEXT });
     let label = ui
-        .add_sized([NAME, 18.0], egui::Label::new(name).sense(egui::Sense::click()).halign(egui::Align::Min))
+        .add(egui::Label::new(name).sense(egui::Sense::click()))
         .on_hover_text(format!("{tip}\n\nDouble click: back to {start:.4}"));
     if label.double_clicked() && differs {
         cloth.values[index] = start;
@@ -99,6 +99,7 @@ fn row(ui: &mut Ui, cloth: &mut Cloth, index: usize, param: &'static Param) -> b
         .suffix(if param.unit.is_empty() { String::new() } else { format!(" {}", param.unit) });
     changed |= ui.add(slider).labelled_by(label.id).on_hover_text(tip).changed();
     if param.role == Role::Linear {
+        ui.spacing_mut().interact_size.x = 26.0;
         changed |= color(ui, &mut cloth.colors[index], param.name);
     }
     changed
@@ -121,8 +122,8 @@ fn stand_in(ui: &mut Ui, cloth: &mut Cloth, misfit: f64) -> bool {
     ui.add_space(4.0);
     ui.label(style::group("In the picture"));
     let mut changed = false;
-    Grid::new("stand-in").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| {
-        let label = ui.add_sized([NAME, 18.0], egui::Label::new("reflection").halign(egui::Align::Min));
+    Grid::new("stand-in").num_columns(2).min_col_width(NAME).spacing([6.0, 4.0]).show(ui, |ui| {
+        let label = ui.label("reflection");
         ui.spacing_mut().slider_width = RAIL;
         let slider = ui.add(Slider::new(&mut cloth.reflect, 0.0..=1.0).max_decimals(3)).labelled_by(label.id);
         changed |= slider.on_hover_text("Share of the light that the curtain reflects evenly; this model knows transmission only").changed();

@@ -1,7 +1,7 @@
 //! The thread that renders: it takes the newest wish, shows a coarse picture of it at once, and refines it pass by pass.
 //!
 //! Wishes do not queue up: a new one takes the place of the one before and stops the pass in progress. The first passes are
-//! coarse enough to be done in [`FIRST`]; from then on passes of the full size are added until [`Wish::passes`].
+//! coarse enough to be done in [`FIRST`]; some at half the size follow, then passes of the full size until [`Wish::passes`].
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -12,6 +12,8 @@ use woven_render::film::Film;
 
 /// The time that a first, coarse picture may take.
 pub const FIRST: Duration = Duration::from_millis(120);
+/// Samples a pixel at half the size before the full size is begun.
+const HALVES: u32 = 6;
 /// A coarse picture is not coarser than this many pixels of the full one along a side.
 const COARSEST: usize = 8;
 
@@ -209,20 +211,29 @@ impl<P: Painter> Loop<P> {
     fn fulfil(&mut self, number: u64, since: Instant, wish: &Wish<P::Scene>) -> Result<(), String> {
         let full = wish.size.map(|s| s.max(1));
         self.painter.prepare(&wish.scene)?;
-        let mut coarse = self.coarseness(full, since.elapsed());
-        while coarse > 1 {
-            let size = full.map(|s| s.div_ceil(coarse));
-            let Some(film) = self.pass(size, 0)? else { return Ok(()) };
-            self.publish(number, since, size, film, [1, wish.passes], false);
-            // The next one has as much time again as all before it.
-            let finer = self.coarseness(full, Duration::ZERO);
-            coarse = finer.min(coarse / 2);
+        let first = self.coarseness(full, since.elapsed());
+        if first > 2 && !self.stage(number, since, wish, first, [1, 1])? {
+            return Ok(());
         }
-        for pass in 0..wish.passes.max(1) {
-            let Some(film) = self.pass(full, pass)? else { return Ok(()) };
-            self.publish(number, since, full, film, [pass + 1, wish.passes], true);
+        if first > 1 && !self.stage(number, since, wish, 2, [HALVES, 1])? {
+            return Ok(());
         }
-        Ok(())
+        // A full picture is shown as soon as it has as many samples on the same area as the one before.
+        let least = if first > 1 { HALVES.div_ceil(4) } else { 1 };
+        self.stage(number, since, wish, 1, [wish.passes.max(1), least]).map(|_| ())
+    }
+
+    /// Renders `passes` samples a pixel at a fraction of the size and shows the picture from the `least`-th on; false when
+    /// there is a newer wish.
+    fn stage(&mut self, number: u64, since: Instant, wish: &Wish<P::Scene>, coarse: usize, [passes, least]: [u32; 2]) -> Result<bool, String> {
+        let size = wish.size.map(|s| s.max(1).div_ceil(coarse));
+        for pass in 0..passes {
+            let Some(film) = self.pass(size, pass)? else { return Ok(false) };
+            if pass + 1 >= least || pass + 1 == passes {
+                self.publish(number, since, size, film, [pass + 1, wish.passes], coarse == 1);
+            }
+        }
+        Ok(true)
     }
 
     /// By what the first picture is coarser than the full one so that it is there in time, as a power of two.

@@ -170,6 +170,17 @@ fn tame(json: &mut Value) {
             }
         }
     }
+    for s in top
+        .get_mut("scenes")
+        .and_then(Value::as_array_mut)
+        .into_iter()
+        .flatten()
+    {
+        // The crate insists on what the specification leaves open.
+        if let Some(s) = s.as_object_mut() {
+            s.entry("nodes").or_insert_with(|| serde_json::json!([]));
+        }
+    }
     for n in top
         .get_mut("nodes")
         .and_then(Value::as_array_mut)

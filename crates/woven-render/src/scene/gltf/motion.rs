@@ -30,24 +30,29 @@ pub struct Motion {
     world: Mat4,
 }
 
-/// Opens a cache by its kind: `.pc2`, else glTF.
+/// Opens a cache: PC2 by its first bytes, else glTF.
 ///
 /// # Errors
 /// A sentence when the file is broken, holds no moving mesh, or is too large.
 pub fn open(path: &Path, limits: &Limits) -> Result<Motion> {
     let bytes = read_file(path, limits.file.max(1 << 30))?;
     let told = || format!("cannot read the moving mesh {}", path.display());
-    if path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("pc2"))
-    {
-        return pc2(&bytes).with_context(told);
-    }
     let base = path
         .parent()
         .filter(|p| !p.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
-    guarded(|| morphs(&bytes, base, limits)).with_context(told)
+    from_bytes(&bytes, base, limits).with_context(told)
+}
+
+/// [`open`] from bytes in memory; `base` is the folder that relative URIs start from.
+///
+/// # Errors
+/// See [`open`].
+pub fn from_bytes(bytes: &[u8], base: &Path, limits: &Limits) -> Result<Motion> {
+    if bytes.starts_with(b"POINTCACHE2") {
+        return pc2(bytes);
+    }
+    guarded(|| morphs(bytes, base, limits))
 }
 
 impl Motion {

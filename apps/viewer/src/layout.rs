@@ -120,8 +120,6 @@ impl Viewer {
     }
 
     fn side(&mut self, ui: &mut Ui) {
-        // The panel is as wide as what is in it; without this it would shrink under its own contents.
-        ui.set_min_width(ui.available_width());
         let plot = Frame::new().inner_margin(Margin { top: 6, ..Margin::ZERO });
         Panel::bottom("plot").frame(plot).exact_size(PLOT.min(ui.available_height() * 0.6)).resizable(false).show(ui, |ui| {
             self.plot.show(ui, &self.cloth, self.measurement.as_ref());

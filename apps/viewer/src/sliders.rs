@@ -34,7 +34,7 @@ pub fn show(ui: &mut Ui, cloth: &mut Cloth, misfit: f64) -> bool {
         }
         ui.add_space(4.0);
         ui.label(style::group(title)).on_hover_text(about);
-        Grid::new(title).num_columns(3).min_col_width(NAME).spacing([6.0, 4.0]).show(ui, |ui| {
+        Grid::new(title).num_columns(3).spacing([6.0, 4.0]).show(ui, |ui| {
             for (index, param) in cloth.params(role) {
                 changed |= row(ui, cloth, index, param);
                 ui.end_row();
@@ -85,8 +85,7 @@ fn row(ui: &mut Ui, cloth: &mut Cloth, index: usize, param: &'static Param) -> b
     let start = cloth.start_of(index);
     let differs = cloth.values[index] != start;
     let name = egui::RichText::new(param.name).color(if differs { style::ACCENT } else { style::TEXT });
-    let label = ui
-        .add(egui::Label::new(name).sense(egui::Sense::click()))
+    let label = named(ui, egui::Label::new(name).sense(egui::Sense::click()))
         .on_hover_text(format!("{tip}\n\nDouble click: back to {start:.4}"));
     if label.double_clicked() && differs {
         cloth.values[index] = start;
@@ -103,6 +102,15 @@ fn row(ui: &mut Ui, cloth: &mut Cloth, index: usize, param: &'static Param) -> b
         changed |= color(ui, &mut cloth.colors[index], param.name);
     }
     changed
+}
+
+/// A label in the column of names.
+fn named(ui: &mut Ui, label: egui::Label) -> egui::Response {
+    ui.horizontal(|ui| {
+        ui.set_min_width(NAME);
+        ui.add(label)
+    })
+    .inner
 }
 
 /// A swatch of a factor's colour; egui's button works in f32.
@@ -122,8 +130,8 @@ fn stand_in(ui: &mut Ui, cloth: &mut Cloth, misfit: f64) -> bool {
     ui.add_space(4.0);
     ui.label(style::group("In the picture"));
     let mut changed = false;
-    Grid::new("stand-in").num_columns(2).min_col_width(NAME).spacing([6.0, 4.0]).show(ui, |ui| {
-        let label = ui.label("reflection");
+    Grid::new("stand-in").num_columns(2).spacing([6.0, 4.0]).show(ui, |ui| {
+        let label = named(ui, egui::Label::new("reflection"));
         ui.spacing_mut().slider_width = RAIL;
         let slider = ui.add(Slider::new(&mut cloth.reflect, 0.0..=1.0).max_decimals(3)).labelled_by(label.id);
         changed |= slider.on_hover_text("Share of the light that the curtain reflects evenly; this model knows transmission only").changed();

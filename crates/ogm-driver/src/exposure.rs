@@ -166,53 +166,119 @@ impl Dark {
     }
 }
 
-/// Merges the exposures of one pose into a rate: each is dark-corrected, divided by its time and by `lamp(reference)`, and weighted by the inverse
-/// of its variance. The variance comes from the merged rate, not from the single noisy count (which would favour low readings), so two rounds are run.
+/// The detector's curvature: it reads c (1 - x c / full scale) where c would be right.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Linearity {
+    /// x, dimensionless.
+    pub x: f64,
+    /// Its standard error.
+    pub sigma: f64,
+}
+
+impl Linearity {
+    /// From readings of one constant light at several exposures (dark already subtracted): a weighted straight line of count rate over counts.
+    /// With fewer than three points nothing is known and nothing is corrected.
+    pub fn from_shots(shots: &[(Shot, f64)], dark: &Dark, detector: &DetectorData) -> Self {
+        let points: Vec<(f64, f64, f64)> = shots
+            .iter()
+            .filter(|(s, _)| !s.saturated && s.counts <= USABLE * detector.full_scale)
+            .map(|(s, lamp)| {
+                let counts = s.counts - dark.at(s.exposure_ms).0;
+                let scale = s.exposure_ms * lamp;
+                let noise = counts.max(0.0) / detector.electrons_per_count
+                    + detector.read_noise.powi(2)
+                    + (counts * detector.reference_noise).powi(2);
+                (
+                    counts / detector.full_scale,
+                    counts / scale,
+                    scale * scale / noise.max(1e-9),
+                )
+            })
+            .collect();
+        if points.len() < 3 {
+            return Linearity::default();
+        }
+        let w: f64 = points.iter().map(|p| p.2).sum();
+        let mean = |g: &dyn Fn(&(f64, f64, f64)) -> f64| {
+            points.iter().map(|p| p.2 * g(p)).sum::<f64>() / w
+        };
+        let (mx, my) = (mean(&|p| p.0), mean(&|p| p.1));
+        let sxx = mean(&|p| (p.0 - mx).powi(2));
+        if sxx < 1e-4 || my <= 0.0 {
+            return Linearity::default();
+        }
+        let slope = mean(&|p| (p.0 - mx) * (p.1 - my)) / sxx;
+        let at_zero = my - slope * mx;
+        Linearity {
+            x: -slope / at_zero,
+            sigma: (1.0 / (w * sxx)).sqrt() / at_zero,
+        }
+    }
+
+    /// The counts a straight detector would have read.
+    pub fn straighten(&self, counts: f64, full_scale: f64) -> f64 {
+        // The root of c (1 - x c/F) = counts that is near it.
+        let q = 1.0 - 4.0 * self.x * counts / full_scale;
+        counts * 2.0 / (1.0 + q.max(0.0).sqrt())
+    }
+}
+
+/// Merges the exposures of one pose into a rate: each is dark-corrected, straightened, divided by its time and by `lamp(shot)`, and weighted by the
+/// inverse of its variance. The variance comes from the merged rate, not from the single noisy count (which would favour low readings), so two rounds
+/// are run.
 ///
 /// # Errors
 /// [`Error::Merge`] when there is no shot at all.
 pub fn merge(
     shots: &[Shot],
     dark: &Dark,
+    linearity: Linearity,
     detector: &DetectorData,
     lamp: impl Fn(&Shot) -> f64,
 ) -> Result<Rate> {
-    let usable: Vec<&Shot> = shots
+    let full = detector.full_scale;
+    let usable = |s: &&Shot| !s.saturated && s.counts <= USABLE * full;
+    let saturated = !shots.iter().any(|s| usable(&s));
+    let shortest = shots
         .iter()
-        .filter(|s| !s.saturated && s.counts <= USABLE * detector.full_scale)
+        .map(|s| s.exposure_ms)
+        .fold(f64::INFINITY, f64::min);
+    let used: Vec<&Shot> = shots
+        .iter()
+        .filter(|s| {
+            if saturated {
+                s.exposure_ms == shortest
+            } else {
+                usable(s)
+            }
+        })
         .collect();
-    let saturated = usable.is_empty();
-    let shortest = || {
-        shots
-            .iter()
-            .min_by(|a, b| a.exposure_ms.total_cmp(&b.exposure_ms))
-            .into_iter()
-            .collect()
-    };
-    let used: Vec<&Shot> = if saturated { shortest() } else { usable };
     if used.is_empty() {
         return Err(Error::Merge(
             "A reading without a single exposure cannot be merged.".into(),
         ));
     }
     let longest = used.iter().map(|s| s.exposure_ms).fold(0.0, f64::max);
-    let rate_of = |s: &Shot| (s.counts - dark.at(s.exposure_ms).0) / s.exposure_ms / lamp(s);
-    let mut value = used
+    let rate_of = |s: &Shot| {
+        linearity.straighten(s.counts - dark.at(s.exposure_ms).0, full) / s.exposure_ms / lamp(s)
+    };
+    let best: Vec<f64> = used
         .iter()
         .filter(|s| s.exposure_ms == longest)
         .map(|s| rate_of(s))
-        .sum::<f64>()
-        / used.iter().filter(|s| s.exposure_ms == longest).count() as f64;
+        .collect();
+    let mut value = best.iter().sum::<f64>() / best.len() as f64;
     let mut sigma = 0.0;
     for _ in 0..2 {
         let (mut top, mut weights, mut dark_part) = (0.0, 0.0, 0.0);
         for s in &used {
             let (dark_counts, dark_sigma) = dark.at(s.exposure_ms);
             let counts = (value * lamp(s) * s.exposure_ms).max(0.0);
-            // Shot noise, read noise, and the ADC's step (1/12).
-            let var = (counts + dark_counts.max(0.0).min(counts)) / detector.electrons_per_count
+            // Shot noise, read noise, the ADC's step (1/12), and the noise of the reference diode.
+            let var = (counts + dark_counts.clamp(0.0, counts)) / detector.electrons_per_count
                 + detector.read_noise.powi(2)
-                + 1.0 / 12.0;
+                + 1.0 / 12.0
+                + (counts * detector.reference_noise).powi(2);
             let scale = s.exposure_ms * lamp(s);
             let weight = scale * scale / var;
             top += weight * rate_of(s);
@@ -220,8 +286,9 @@ pub fn merge(
             dark_part += weight * dark_sigma / scale;
         }
         value = top / weights;
-        // The dark level is shared by all shots of one exposure: its error adds up, it does not average out.
-        sigma = (1.0 / weights + (dark_part / weights).powi(2)).sqrt();
+        // The dark level is shared by all shots of one exposure: its error adds up, it does not average out. So does the curvature's.
+        let bent = value * linearity.sigma * value.abs() * longest / full;
+        sigma = (1.0 / weights + (dark_part / weights).powi(2) + bent.powi(2)).sqrt();
     }
     Ok(Rate {
         value,
@@ -266,7 +333,7 @@ mod tests {
             let dark = Dark {
                 steps: vec![(1.0, 120.0, 0.0), (4096.0, 120.0, 0.0)],
             };
-            let merged = merge(&shots, &dark, &d, |_| 1.0).unwrap();
+            let merged = merge(&shots, &dark, Linearity::default(), &d, |_| 1.0).unwrap();
             assert!(!merged.saturated);
             worst = worst.max((merged.value / rate - 1.0).abs());
         }
@@ -279,7 +346,7 @@ mod tests {
         let shots = [shot(1.0, 2e6, d.full_scale)];
         assert_eq!(Exposures::default().next(&shots, &d), None);
         assert!(
-            merge(&shots, &Dark::default(), &d, |_| 1.0)
+            merge(&shots, &Dark::default(), Linearity::default(), &d, |_| 1.0)
                 .unwrap()
                 .saturated
         );
@@ -287,8 +354,12 @@ mod tests {
 
     #[test]
     fn the_stated_error_is_the_spread() {
+        let d = DetectorData {
+            reference_noise: 0.0,
+            ..DetectorData::default()
+        };
         let (d, e) = (
-            DetectorData::default(),
+            d,
             Exposures {
                 ladder_ms: vec![10.0, 100.0],
                 ..Exposures::default()
@@ -316,7 +387,7 @@ mod tests {
                         }
                     })
                     .collect();
-                let m = merge(&shots, &dark, &d, |_| 1.0).unwrap();
+                let m = merge(&shots, &dark, Linearity::default(), &d, |_| 1.0).unwrap();
                 (m.value - rate) / m.sigma
             })
             .collect();
@@ -327,5 +398,33 @@ mod tests {
             mean.abs() < 0.064 && (spread - 1.0).abs() < 0.045,
             "{mean} {spread}"
         );
+    }
+
+    #[test]
+    fn the_curvature_is_found_and_taken_out() {
+        let d = DetectorData::default();
+        let mut shots = Vec::new();
+        for k in 1..=10 {
+            let ms = 0.15 * f64::from(k);
+            let c = 600_000.0 * ms;
+            let mut noise = Noise::at(&[k as u64, 3]);
+            let read = c * (1.0 - 0.005 * c / d.full_scale)
+                + noise.normal() * (c / d.electrons_per_count).sqrt();
+            shots.push((shot(ms, read, d.full_scale), 1.0));
+        }
+        let l = Linearity::from_shots(&shots, &Dark::default(), &d);
+        assert!(
+            (l.x - 0.005).abs() < 4.0 * l.sigma && l.sigma < 0.001,
+            "{l:?}"
+        );
+        for c in [0.0, 1e3, 5e5, 9e5] {
+            let exact = Linearity {
+                x: 0.005,
+                sigma: 0.0,
+            };
+            assert!(
+                (exact.straighten(c * (1.0 - 0.005 * c / 1e6), 1e6) - c).abs() < 1e-6 * c.max(1.0)
+            );
+        }
     }
 }

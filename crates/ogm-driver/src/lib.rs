@@ -21,16 +21,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod adaptive;
 pub mod axis;
 pub mod controller;
 pub mod detector;
 pub mod error;
 pub mod exposure;
+pub mod external;
 pub mod log;
 pub mod merge;
 pub mod plan;
 pub mod pose;
 pub mod protocol;
+pub mod replay;
 pub mod rig;
 pub mod scan;
 pub mod serial;

@@ -29,6 +29,8 @@ pub enum What {
     Dark,
     /// The direct beam, without the sample: the scale.
     Direct,
+    /// The direct beam at exposures over the detector's range.
+    Linearity,
     /// The white standard.
     White,
     /// The direct beam again, to follow the lamp.

@@ -9,10 +9,13 @@ use std::time::Duration;
 use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use ogm_driver::detector::{Detector, SerialPhotodiode};
 use ogm_driver::error::{Error, Result};
+use ogm_driver::external::ExternalDetector;
 use ogm_driver::log::{self, Reading, What};
 use ogm_driver::merge;
 use ogm_driver::plan::Plan;
+use ogm_driver::replay;
 use ogm_driver::rig::{Language, Rig};
 use ogm_driver::scan::{self, Watcher};
 use ogm_driver::serial::SerialTransport;
@@ -88,6 +91,9 @@ enum Command {
         /// The rig: shot, grbl, instant, or a TOML file.
         #[arg(long, default_value = "shot")]
         rig: String,
+        /// A command that is the detector and answers JSON lines, instead of the photodiode on the rig's line.
+        #[arg(long)]
+        detector: Option<String>,
         /// Prints a line for every stored reading.
         #[arg(long)]
         verbose: bool,
@@ -104,7 +110,13 @@ enum Command {
         #[arg(long)]
         list: bool,
     },
-    /// Merges a scan log into a measurement (CSV).
+    /// Looks at a scan again without the rig: checks every record against its plan and rig, and recomputes the measurement.
+    #[command(after_help = "Example: ogm replay lace.ogm")]
+    Replay {
+        /// The log.
+        log: PathBuf,
+    },
+    /// Merges a scan log into a measurement: .csv, .txt (pgII text, one file for each incidence), or .xml (a whole Klems matrix).
     #[command(after_help = "Example: ogm merge lace.ogm -o lace.csv")]
     Merge {
         /// The log.
@@ -200,6 +212,7 @@ fn run(command: Command) -> Result<()> {
             plan,
             output,
             rig,
+            detector,
             verbose,
         } => {
             let (rig, plan) = (rig_named(&rig)?, Plan::load(&plan)?);
@@ -208,7 +221,19 @@ fn run(command: Command) -> Result<()> {
             let transport = SerialTransport::open(&port, rig.baud, rig.rts_cts)?;
             let mut show = Show::new(route.poses.len(), verbose);
             let stop = stop_on_signal();
-            let outcome = scan::run(Box::new(transport), &rig, &plan, &output, &stop, &mut show)?;
+            let detector: Box<dyn Detector> = match detector {
+                Some(command) => Box::new(ExternalDetector::start(&command)?),
+                None => Box::new(SerialPhotodiode),
+            };
+            let outcome = scan::run_with(
+                Box::new(transport),
+                detector,
+                &rig,
+                &plan,
+                &output,
+                &stop,
+                &mut show,
+            )?;
             show.bar.finish_and_clear();
             eprintln!(
                 "{} of {} poses are in {} ({} were there before).",
@@ -245,6 +270,43 @@ fn run(command: Command) -> Result<()> {
             }
             Ok(())
         }
+        Command::Replay { log: path } => {
+            let r = replay::replay(&log::read(&path)?)?;
+            let counts: Vec<String> = r.readings.iter().map(|(k, n)| format!("{n} {k}")).collect();
+            println!(
+                "{} sessions, {}; {} poses missing, {} saturated.",
+                r.sessions,
+                counts.join(", "),
+                r.missing,
+                r.saturated
+            );
+            println!(
+                "{}",
+                if r.complete {
+                    "The scan is complete."
+                } else {
+                    "The scan is not complete; `ogm scan` goes on."
+                }
+            );
+            if let Some(m) = &r.measurement {
+                println!(
+                    "{} values and {} straight-through transmittances.",
+                    m.samples.len(),
+                    m.direct.len()
+                );
+                for c in &m.comments {
+                    println!("  {c}");
+                }
+            }
+            match r.findings.as_slice() {
+                [] => Ok(()),
+                all => Err(Error::Log(format!(
+                    "{} findings: {}",
+                    all.len(),
+                    all.join(" ")
+                ))),
+            }
+        }
         Command::Merge {
             log: path,
             output,
@@ -255,7 +317,21 @@ fn run(command: Command) -> Result<()> {
             } else {
                 merge::merge_log(&path)?
             };
-            measurement.write_csv(&output)?;
+            match output.extension().and_then(|e| e.to_str()) {
+                Some("csv") => measurement.write_csv(&output)?,
+                Some("txt") => {
+                    for file in measurement.write_pab(&output)? {
+                        println!("{}", file.display());
+                    }
+                }
+                Some("xml") => measurement.write_klems(&output)?,
+                _ => {
+                    return Err(Error::Merge(format!(
+                        "{} should end in .csv, in .txt for pgII text, or in .xml for a Klems matrix; choose one.",
+                        output.display()
+                    )));
+                }
+            }
             eprintln!(
                 "{} values and {} straight-through transmittances in {}.",
                 measurement.samples.len(),

@@ -76,6 +76,8 @@ pub struct Calibration {
     pub dark: u32,
     /// Direct-beam readings without the sample, this many.
     pub direct: u32,
+    /// Brackets of the direct beam from a tenth of full scale to the end, which tell the detector's curvature; this many.
+    pub linearity: u32,
     /// Measure the white standard.
     pub white: bool,
     /// A reference reading after this many poses; 0 = only at the start.
@@ -105,6 +107,7 @@ impl Default for Calibration {
             warm_up_min: 30.0,
             dark: 4,
             direct: 4,
+            linearity: 2,
             white: true,
             reference_every: 50,
             drift: Drift::Diode,
@@ -174,6 +177,7 @@ pub enum Grid {
     /// The patch centres of the Klems basis (145), for some incident polar angles in the plane of azimuth 0.
     Klems {
         /// Light polar angles.
+        #[serde(default = "zero")]
         theta_l: Angles,
         /// Light azimuths.
         #[serde(default = "zero")]
@@ -181,6 +185,9 @@ pub enum Grid {
         /// Measure the transmitted hemisphere (else the reflected one).
         #[serde(default = "yes")]
         transmission: bool,
+        /// The light at every patch, too: the 21025 pairs of a whole matrix.
+        #[serde(default)]
+        all_incidences: bool,
     },
     /// Random directions, even over the projected hemispheres; light in front, detector behind.
     Random {
@@ -192,11 +199,126 @@ pub enum Grid {
         #[serde(default = "random_max")]
         theta_max: f64,
     },
+    /// Planes through the normal that are refined where the light changes fast.
+    Adaptive(Adaptive),
     /// One by one: [theta_l, phi_l, theta_v, phi_v] in degrees.
     List {
         /// The poses.
         poses: Vec<[f64; AXES]>,
     },
+}
+
+/// The adaptive grid: first `first_step` over each plane and some poses beside straight through, then halved intervals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Adaptive {
+    /// Light polar angles, degrees.
+    pub theta_l: Angles,
+    /// Light azimuths, degrees.
+    pub phi_l: Angles,
+    /// Azimuths of the detector's planes, degrees; each plane is run on both sides of the normal.
+    pub planes: Angles,
+    /// The planes end this far from straight behind the sample, degrees.
+    pub reach: f64,
+    /// First distance of the poses, degrees.
+    pub first_step: f64,
+    /// No interval is made shorter than this, degrees.
+    pub least_step: f64,
+    /// A straight line between neighbours may be off by this share of the value (and a fiftieth of the peak).
+    pub tolerance: f64,
+    /// At least this many poses within the full width at half maximum.
+    pub per_fwhm: u32,
+    /// Never more poses than this.
+    pub most: u32,
+}
+
+impl Default for Adaptive {
+    fn default() -> Self {
+        Adaptive {
+            theta_l: zero(),
+            phi_l: zero(),
+            planes: zero(),
+            reach: 80.0,
+            first_step: 16.0,
+            least_step: 0.1,
+            tolerance: 0.05,
+            per_fwhm: 5,
+            most: 10_000,
+        }
+    }
+}
+
+impl Adaptive {
+    /// Every (theta_l, phi_l, plane).
+    ///
+    /// # Errors
+    /// [`Error::Plan`].
+    pub fn planes(&self) -> Result<Vec<(f64, f64, f64)>> {
+        let (tl, pl) = (
+            self.theta_l.values("grid.theta_l")?,
+            self.phi_l.values("grid.phi_l")?,
+        );
+        let planes = self.planes.values("grid.planes")?;
+        let mut out = Vec::new();
+        for t in &tl {
+            for p in &pl {
+                out.extend(planes.iter().map(|plane| (*t, *p, *plane)));
+            }
+        }
+        Ok(out)
+    }
+
+    /// The pose at the signed angle `t` (degrees from straight behind the sample) of a plane.
+    pub fn pose(theta_l: f64, phi_l: f64, plane: f64, t: f64) -> Pose {
+        let phi = if t >= 0.0 {
+            plane
+        } else if plane > 0.0 {
+            plane - 180.0
+        } else {
+            plane + 180.0
+        };
+        Pose::new(theta_l, phi_l, 180.0 - t.abs(), phi)
+    }
+
+    /// The first poses: even over each plane, and closer and closer towards straight through.
+    fn first(&self) -> Result<Vec<Pose>> {
+        let positive = [self.reach, self.first_step, self.least_step, self.tolerance];
+        if positive.iter().any(|x| x.is_nan() || *x <= 0.0)
+            || self.reach > 89.0
+            || self.per_fwhm > 1000
+            || self.least_step < 0.01
+        {
+            return Err(refused(
+                "an adaptive grid needs reach in 0..89, positive first_step and tolerance, least_step of at least 0.01, per_fwhm up to 1000",
+            ));
+        }
+        let n = (self.reach / self.first_step).ceil().clamp(1.0, 1000.0);
+        let mut out = Vec::new();
+        for (theta_l, phi_l, plane) in self.planes()? {
+            let mut angles: Vec<f64> = (0..=2 * n as u32)
+                .map(|k| self.reach * (f64::from(k) / n - 1.0))
+                .collect();
+            // Straight through lies on this plane at +theta_l or -theta_l, if at all.
+            let turn = (phi_l + 180.0 - plane).rem_euclid(360.0);
+            let straight = if turn < 90.0 || turn > 270.0 {
+                theta_l
+            } else {
+                -theta_l
+            };
+            for offset in [1.0, 2.0, 4.0, 8.0] {
+                angles.extend([straight - offset, straight + offset]);
+            }
+            angles.retain(|t| t.abs() <= self.reach);
+            angles.sort_by(f64::total_cmp);
+            angles.dedup_by(|a, b| (*a - *b).abs() < 0.5);
+            out.extend(
+                angles
+                    .into_iter()
+                    .map(|t| Self::pose(theta_l, phi_l, plane, t)),
+            );
+        }
+        Ok(out)
+    }
 }
 
 fn paper_light() -> Angles {
@@ -333,22 +455,28 @@ impl Grid {
                 theta_l,
                 phi_l,
                 transmission,
+                all_incidences,
             } => {
-                for tl in theta_l.values("grid.theta_l")? {
-                    for pl in phi_l.values("grid.phi_l")? {
-                        for (low, high, count) in KLEMS_RINGS {
-                            let theta = if low == 0.0 { 0.0 } else { (low + high) / 2.0 };
-                            let theta_v = if *transmission { 180.0 - theta } else { theta };
-                            out.extend((0..count).map(|k| {
-                                let phi = f64::from(k) * 360.0 / f64::from(count);
-                                Pose::new(
-                                    tl,
-                                    pl,
-                                    theta_v,
-                                    if phi > 180.0 { phi - 360.0 } else { phi },
-                                )
-                            }));
-                        }
+                let turn = |phi: f64| if phi > 180.0 { phi - 360.0 } else { phi };
+                let centres = || {
+                    KLEMS_RINGS.into_iter().flat_map(|(low, high, count)| {
+                        let theta = if low == 0.0 { 0.0 } else { (low + high) / 2.0 };
+                        (0..count).map(move |k| (theta, f64::from(k) * 360.0 / f64::from(count)))
+                    })
+                };
+                let mut lights = Vec::new();
+                if *all_incidences {
+                    // A patch is named by the way the light travels: its light stands opposite.
+                    lights.extend(centres().map(|(t, p)| (t, turn((p + 180.0) % 360.0))));
+                } else {
+                    for tl in theta_l.values("grid.theta_l")? {
+                        lights.extend(phi_l.values("grid.phi_l")?.into_iter().map(|pl| (tl, pl)));
+                    }
+                }
+                for (tl, pl) in lights {
+                    for (theta, phi) in centres() {
+                        let theta_v = if *transmission { 180.0 - theta } else { theta };
+                        out.push(Pose::new(tl, pl, theta_v, turn(phi)));
                     }
                 }
             }
@@ -375,6 +503,7 @@ impl Grid {
                     out.push(Pose::new(tl, pl, 180.0 - tv, pv));
                 }
             }
+            Grid::Adaptive(a) => out = a.first()?,
             Grid::List { poses } => out.extend(poses.iter().map(|a| Pose::from_angles(*a))),
         }
         if out.is_empty() || out.len() > MOST_POSES {
@@ -437,9 +566,9 @@ impl Plan {
                 "calibration.warm_up_min must be 0..1440 and calibration.resume_tolerance 0..1",
             ));
         }
-        if c.direct == 0 || c.direct > 100 || c.dark > 100 {
+        if c.direct == 0 || c.direct > 100 || c.dark > 100 || c.linearity > 100 {
             return Err(refused(
-                "calibration.direct must be 1..100 and calibration.dark 0..100; without the direct beam there is no scale",
+                "calibration.direct must be 1..100, calibration.dark and calibration.linearity 0..100; without the direct beam there is no scale",
             ));
         }
         if c.drift == Drift::Reference && c.reference_every == 0 {

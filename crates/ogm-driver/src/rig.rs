@@ -34,7 +34,9 @@ pub struct DetectorData {
     pub electrons_per_count: f64,
     /// Half the full angle of the light's divergence, degrees: the straight-through beam is this wide.
     pub beam_half_deg: f64,
-    /// Relative standard uncertainty of the detector's linearity over its range.
+    /// Relative standard deviation of one reading of the reference diode.
+    pub reference_noise: f64,
+    /// Relative standard uncertainty of the detector's linearity over its range, beyond the curvature that is measured.
     pub linearity: f64,
     /// Standard uncertainty of each axis angle, degrees.
     pub angle_deg: f64,
@@ -48,6 +50,7 @@ impl Default for DetectorData {
             read_noise: 3.0,
             electrons_per_count: 20.0,
             beam_half_deg: 0.2,
+            reference_noise: 1e-4,
             linearity: 0.0,
             angle_deg: 0.0,
         }
@@ -218,7 +221,13 @@ impl Rig {
                 "detector.aperture_deg must be in 0..30 and detector.full_scale positive",
             );
         }
-        let at_least_zero = [d.read_noise, d.beam_half_deg, d.linearity, d.angle_deg];
+        let at_least_zero = [
+            d.reference_noise,
+            d.read_noise,
+            d.beam_half_deg,
+            d.linearity,
+            d.angle_deg,
+        ];
         if at_least_zero.iter().any(|x| !(*x >= 0.0 && x.is_finite()))
             || d.electrons_per_count.is_nan()
             || d.electrons_per_count <= 0.0

@@ -254,7 +254,7 @@ fn named_faults_have_their_sentence() {
         ("stall@20", "should be at"),
         ("overshoot@20", "should be at"),
         ("ng@20", "refused"),
-        ("power-cycle@50", "start again"),
+        ("power-cycle@50", "longer than the move can take"),
         ("lamp-off@60", "lamp went out"),
         ("drop~1", "No reply from the rig within 1 s after ?:N"),
     ] {

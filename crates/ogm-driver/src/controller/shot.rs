@@ -152,6 +152,8 @@ fn four(positions: &[i64]) -> [i64; AXES] {
 
 impl Controller for ShotController {
     fn identify(&mut self, link: &mut Link, rig: &Rig) -> Result<String> {
+        // Answers to an earlier session that died may still be on their way.
+        link.wait(Duration::from_millis(20))?;
         let mut ask = |q| {
             link.ask(
                 &self.bytes(&Command::Ask(q))?,
@@ -160,8 +162,8 @@ impl Controller for ShotController {
                 |line| {
                     let plain =
                         line.len() > 2 && line.bytes().all(|b| b.is_ascii_graphic() || b == b' ');
-                    Ok((plain && shot::parse_status(line).is_none())
-                        .then(|| line.trim().to_string()))
+                    let stray = line.starts_with('@') || shot::parse_status(line).is_some();
+                    Ok((plain && !stray).then(|| line.trim().to_string()))
                 },
             )
         };

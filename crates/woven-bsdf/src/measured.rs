@@ -15,8 +15,8 @@ impl Refused {
     }
 }
 
-/// Reads a file of at most 256 MiB as text, with a sentence when it cannot.
-pub(crate) fn read_text(path: &std::path::Path) -> Result<String, Refused> {
+/// Reads a file of at most 256 MiB, with a sentence when it cannot.
+pub(crate) fn read_bytes(path: &std::path::Path) -> Result<Vec<u8>, Refused> {
     const LIMIT: u64 = 256 << 20;
     let fail = |e: std::io::Error| Refused::new(format!("cannot read {}: {e}", path.display()));
     let length = std::fs::metadata(path).map_err(fail)?.len();
@@ -26,8 +26,12 @@ pub(crate) fn read_text(path: &std::path::Path) -> Result<String, Refused> {
             path.display()
         )));
     }
-    let bytes = std::fs::read(path).map_err(fail)?;
-    String::from_utf8(bytes).map_err(|e| {
+    std::fs::read(path).map_err(fail)
+}
+
+/// [`read_bytes`] as text.
+pub(crate) fn read_text(path: &std::path::Path) -> Result<String, Refused> {
+    String::from_utf8(read_bytes(path)?).map_err(|e| {
         Refused::new(format!(
             "{} is not UTF-8 text (byte {})",
             path.display(),

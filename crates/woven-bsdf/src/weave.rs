@@ -1,4 +1,7 @@
-//! The gap: how much of the light passes between the yarns, for every direction.
+//! The gap: how much of the light passes between the yarns, for every direction; and drafts of weaves.
+
+pub mod draft;
+pub mod wif;
 
 use crate::real::Real;
 use crate::term::albedo::GAUSS8;

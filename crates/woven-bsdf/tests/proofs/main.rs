@@ -2,7 +2,9 @@
 
 mod albedo;
 mod derivatives;
+mod drafts;
 mod energy;
+mod fuzz;
 mod published;
 mod readers;
 mod reciprocity;

@@ -394,7 +394,7 @@ impl Viewer {
             self.picture = Some(picture);
         }
         if let Some(picture) = &self.picture {
-            let recipe = Recipe { exposure: self.exposure + self.preset.exposure(), smooth: self.smooth };
+            let recipe = Recipe { exposure: self.exposure + self.preset.exposure(), smooth: self.smooth, samples: picture.passes };
             let wanted = Some((picture.number, recipe));
             if self.developed != wanted {
                 self.developed = wanted;

@@ -6,10 +6,12 @@ use std::thread::JoinHandle;
 use woven_render::denoise::{self, denoise};
 use woven_render::film::{Curve, Film};
 
-/// Half the window of the filter, in pixels, for coarse and for full pictures: small, so that it keeps up with the renderer.
-const RADII: [usize; 2] = [6, 4];
-/// Pixels of a coarse picture at most.
-const COARSE: usize = 120_000;
+use crate::smooth::smooth;
+
+/// Half the window of the renderer's filter, in pixels: small, so that it keeps up with the renderer.
+const RADIUS: usize = 4;
+/// Samples a pixel from which on the renderer's filter knows the noise; before, light is spread within surfaces.
+const ENOUGH: u32 = 12;
 
 /// A picture for the screen.
 #[derive(Clone, Debug)]
@@ -29,6 +31,8 @@ pub struct Recipe {
     pub exposure: f32,
     /// Filters the noise.
     pub smooth: bool,
+    /// Samples a pixel in the film.
+    pub samples: u32,
 }
 
 /// What is to be developed.
@@ -69,8 +73,12 @@ pub fn develop(film: &Film, recipe: Recipe) -> Vec<u8> {
         return film.to_rgb8(Curve::Filmic, recipe.exposure);
     }
     let mut film = film.clone();
-    let radius = RADII[usize::from(film.width * film.height > COARSE)];
-    denoise(&mut film, &denoise::Settings { radius, ..denoise::Settings::default() });
+    if recipe.samples < ENOUGH {
+        // One round less for each doubling of the samples.
+        smooth(&mut film, 5 - recipe.samples.max(1).ilog2());
+    } else {
+        denoise(&mut film, &denoise::Settings { radius: RADIUS, ..denoise::Settings::default() });
+    }
     film.to_rgb8(Curve::Filmic, recipe.exposure)
 }
 
@@ -132,7 +140,7 @@ mod tests {
     fn a_print_is_the_film_of_the_renderer() {
         let darkroom = Darkroom::new(|| ());
         let film = Arc::new(Film::of_beauty(2, 1, vec![[0.18, 0.18, 0.18], [4.0, 0.0, 0.0]]));
-        darkroom.put(Arc::clone(&film), Recipe { exposure: 1.0, smooth: false });
+        darkroom.put(Arc::clone(&film), Recipe { exposure: 1.0, smooth: false, samples: 1 });
         let begin = std::time::Instant::now();
         let print = loop {
             if let Some(print) = darkroom.newer(0) {

@@ -12,7 +12,7 @@ use crate::{sliders, style};
 /// Width of the right panel.
 const SIDE: f32 = 348.0;
 /// Height of the plot with its controls and numbers.
-const PLOT: f32 = 396.0;
+const PLOT: f32 = 430.0;
 
 impl Viewer {
     /// The whole window.
@@ -192,7 +192,7 @@ impl Viewer {
     }
 
     fn keys(&mut self, ctx: &egui::Context) {
-        if self.choosing() || ctx.memory(|m| m.focused().is_some()) {
+        if self.choosing() || ctx.text_edit_focused() {
             return;
         }
         let pressed = |modifiers: Modifiers, key| ctx.input_mut(|i| i.consume_key(modifiers, key));

@@ -131,11 +131,7 @@ impl Painter for StagePainter {
             return Ok(None);
         }
         let (device, fell_back) = (renderer.device(), renderer.note().is_some());
-        let mut film = renderer.film().map_err(told)?;
-        if renderer.samples() < 4 {
-            // The scatter of so few samples says nothing; the filter then looks at the neighbours.
-            film.layers.retain(|l| l.name != "variance");
-        }
+        let film = renderer.film().map_err(told)?;
         self.backend = device;
         if fell_back {
             // There is no GPU, or it was lost: looking for one again would cost time at every change.

@@ -2,6 +2,8 @@
 
 pub mod csv;
 pub mod klems;
+pub mod klems_write;
+pub mod shop;
 
 /// Why a measurement file was refused; the text says what, where and what to do.
 #[derive(Debug, thiserror::Error)]

@@ -9,5 +9,6 @@ mod published;
 mod readers;
 mod reciprocity;
 mod sampling;
+mod shop;
 mod support;
 mod weave;

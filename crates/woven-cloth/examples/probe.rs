@@ -1,6 +1,6 @@
 //! Runs a curtain's description and prints where its threads are stretched most: `probe CURTAIN.toml [frames]`.
 
-use woven_cloth::{CurtainSpec, Simulation};
+use woven_cloth::{CurtainSpec, Simulation, crossings};
 
 fn main() -> Result<(), woven_cloth::Error> {
     let mut args = std::env::args().skip(1);
@@ -27,11 +27,16 @@ fn main() -> Result<(), woven_cloth::Error> {
                 at = (w, s, i, j);
             }
         });
-        if r.max_strain > worst || f % 24 == 0 {
+        let through = if f % 12 == 0 {
+            crossings(&sim.frame().positions, &sim.mesh())
+        } else {
+            0
+        };
+        if through > 0 || r.max_strain > worst || f % 24 == 0 {
             worst = r.max_strain.max(worst);
             let thread = if at.0 { "warp" } else { "weft" };
             println!(
-                "frame {f}: {:+.2} % of {thread} at column {} row {}, fastest {:.2} m/s, kinetic {:.4} J",
+                "frame {f}: {:+.2} % of {thread} at column {} row {}, fastest {:.2} m/s, kinetic {:.4} J, {through} crossings",
                 at.1 * 100.0,
                 at.2,
                 at.3,

@@ -7,11 +7,13 @@
 //! the warp from the heading down, 0 to 1. Vertex (i, j) is number j × columns + i; +Y is up, metres.
 //!
 //! **`.pc2`** `POINTCACHE2\0`, then little-endian i32 version 1, i32 points, f32 start 0, f32 rate 1, i32 samples, then f32 x y z for every
-//! point of every sample, in the same order of vertices. **`.mdd`** the same big-endian, with its times in seconds.
+//! point of every sample, in the same order of vertices. **`.mdd`** the same big-endian, with its times in seconds. **`.usda`** a Mesh with time samples of points and
+//! velocities.
 
 pub(crate) mod glb;
 pub(crate) mod points;
 pub(crate) mod state;
+pub(crate) mod usd;
 
 use crate::clip::CurtainClip;
 use crate::error::{Error, Result};
@@ -34,9 +36,9 @@ pub(crate) fn check_extension(path: &Path, frames: usize) -> Result<()> {
         "glb" if frames > MAX_TARGETS => Err(Error::Cache(format!(
             "a .glb holds at most {MAX_TARGETS} frames (viewers abort beyond 256 morph targets) and this clip has {frames}; write a .pc2, or fewer frames"
         ))),
-        "glb" | "pc2" | "mdd" => Ok(()),
+        "glb" | "pc2" | "mdd" | "usda" => Ok(()),
         other => Err(Error::Cache(format!(
-            "the extension `{other}` of {} is not one of glb, pc2, mdd",
+            "the extension `{other}` of {} is not one of glb, pc2, mdd, usda",
             path.display()
         ))),
     }
@@ -48,6 +50,7 @@ pub(crate) fn write(clip: &CurtainClip, path: &Path) -> Result<()> {
     let bytes = match extension(path).as_str() {
         "glb" => glb::encode(clip)?,
         "pc2" => points::pc2(clip),
+        "usda" => usd::encode(clip).into_bytes(),
         _ => points::mdd(clip),
     };
     write_whole(path, &bytes)

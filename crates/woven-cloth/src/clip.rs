@@ -20,7 +20,7 @@ pub struct CurtainClip {
 }
 
 impl CurtainClip {
-    /// Writes the clip; the extension decides: `.glb`, `.pc2` or `.mdd`. The file appears whole or not at all.
+    /// Writes the clip; the extension decides: `.glb`, `.pc2`, `.mdd` or `.usda`. The file appears whole or not at all.
     ///
     /// # Errors
     /// When the extension is unknown, the clip does not fit the format, or writing fails.

@@ -74,18 +74,20 @@ impl Obstacles {
 }
 
 /// Acceleration of vertices that touch, m/s².
-const REPULSION: f64 = 150.0;
+const REPULSION: f64 = 300.0;
 
 /// Contact of the cloth with itself: vertices of different folds keep their distance.
 ///
-/// Two vertices that lie further apart on the cloth than `ring` cells repel each other inside `distance`, which is at least the
-/// grid's spacing: then no vertex can slip between the corners of a cell. Friction holds them against sliding.
+/// Two vertices that are no neighbours repel each other inside `distance`, which is at least the grid's spacing, so that a vertex
+/// hardly slips between the corners of a cell; vertices near each other on the cloth inside half their way on it. Friction holds
+/// them against sliding. This keeps folds apart as the eye sees them; it is no proof that no triangle ever crosses another.
 #[derive(Clone, Debug)]
 pub struct SelfContact {
     distance: f64,
     friction: f64,
     margin: f64,
-    pairs: Vec<(u32, u32)>,
+    /// Two vertices and the distance they keep, m.
+    pairs: Vec<(u32, u32, f64)>,
     /// Where the vertices were when the pairs were gathered.
     seen: Field,
 }
@@ -111,12 +113,11 @@ impl SelfContact {
     /// Separates close pairs in `x`; the sheet still has the places before the step.
     pub(crate) fn resolve(&mut self, sheet: &Sheet, x: &mut Field, hp: f64) {
         self.gather_if_moved(sheet, x);
-        let d2 = self.distance * self.distance;
-        for &(a, b) in &self.pairs {
+        for &(a, b, keep) in &self.pairs {
             let (a, b) = (a as usize, b as usize);
             let d: [f64; 3] = std::array::from_fn(|c| x[c][b] - x[c][a]);
             let l2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            if l2 >= d2 || l2 < 1e-16 {
+            if l2 >= keep * keep || l2 < 1e-16 {
                 continue;
             }
             let (wa, wb) = (sheet.inv_mass[a], sheet.inv_mass[b]);
@@ -124,13 +125,15 @@ impl SelfContact {
                 continue;
             }
             let l = l2.sqrt();
-            // Repulsion as an acceleration: enough to stop folds that meet at 1 m/s within a grid's spacing, too weak to stretch
-            // threads when folds are caught in each other.
-            let way_out = REPULSION * hp * hp * (1.0 - l / self.distance);
-            let push = way_out / (l * (wa + wb));
             let before: [f64; 3] = std::array::from_fn(|c| sheet.x[c][b] - sheet.x[c][a]);
             let mut slip: [f64; 3] = std::array::from_fn(|c| d[c] - before[c]);
             let along = (slip[0] * d[0] + slip[1] * d[1] + slip[2] * d[2]) / l2;
+            // A cushion without spring: what the pair came nearer in this step is taken back, the more the deeper it is, so a
+            // contact gives no energy and stretches no thread; a weak repulsion parts what lies close.
+            let depth = 1.0 - l / keep;
+            let way_out =
+                REPULSION * hp * hp * depth + (-along * l).max(0.0) * (2.0 * depth).min(1.0);
+            let push = way_out / (l * (wa + wb));
             for c in 0..3 {
                 slip[c] -= along * d[c];
             }
@@ -164,65 +167,98 @@ impl SelfContact {
         self.seen.clone_from(x);
         self.pairs.clear();
         let reach = self.distance + self.margin;
-        let (cells, order, start) = sort_into_cells(x, reach);
-        let ring = (reach / sheet.hx.min(sheet.hy)).ceil() as usize + 1;
+        let cells = sort_into_cells(x, reach);
         let nx = sheet.nx;
-        for (a, &cell) in cells.iter().enumerate() {
+        for a in 0..cells.key.len() {
             let (ia, ja) = (a % nx, a / nx);
-            for dz in 0..3u64 {
-                for dy in 0..3u64 {
-                    for dx in 0..3u64 {
-                        let other = cell
-                            .wrapping_add(dx.wrapping_sub(1))
-                            .wrapping_add(dy.wrapping_sub(1).wrapping_mul(1 << 21))
-                            .wrapping_add(dz.wrapping_sub(1).wrapping_mul(1 << 42));
-                        let first = start.partition_point(|&(c, _)| c < other);
-                        let Some(&(c, from)) = start.get(first) else {
-                            continue;
-                        };
-                        if c != other {
-                            continue;
-                        }
-                        let to = start.get(first + 1).map_or(order.len(), |&(_, s)| s);
-                        for &b in &order[from..to] {
-                            let b = b as usize;
-                            if b <= a
-                                || (b / nx).abs_diff(ja) <= ring && (b % nx).abs_diff(ia) <= ring
-                            {
-                                continue;
-                            }
-                            let d2: f64 = (0..3).map(|c| (x[c][b] - x[c][a]).powi(2)).sum();
-                            if d2 < reach * reach {
-                                self.pairs.push((a as u32, b as u32));
-                            }
-                        }
+            let first = self.pairs.len();
+            cells.near([x[0][a], x[1][a], x[2][a]], |b| {
+                let (di, dj) = ((b % nx).abs_diff(ia), (b / nx).abs_diff(ja));
+                if b <= a || (di <= 1 && dj <= 1) {
+                    return;
+                }
+                // Vertices near each other on the cloth may come as near as a sharp crease brings them, no nearer.
+                let on_cloth = (di as f64 * sheet.hx).hypot(dj as f64 * sheet.hy);
+                let keep = self.distance.min(0.5 * on_cloth);
+                let d2: f64 = (0..3).map(|c| (x[c][b] - x[c][a]).powi(2)).sum();
+                if d2 < (keep + self.margin).powi(2).min((0.9 * on_cloth).powi(2)) {
+                    self.pairs.push((a as u32, b as u32, keep));
+                }
+            });
+            // The order of pairs must not depend on when they were gathered, or a resumed run would differ in its last bits.
+            self.pairs[first..].sort_unstable_by_key(|&(_, b, _)| b);
+        }
+    }
+}
+
+/// Points sorted into cubic cells.
+pub(crate) struct Cells {
+    inv_size: f64,
+    /// The cell of every point.
+    key: Vec<u64>,
+    /// The points sorted by cell, then by number.
+    order: Vec<u32>,
+    /// The cells that hold something, ascending, each with the place in `order` where it starts.
+    start: Vec<(u64, usize)>,
+}
+
+impl Cells {
+    /// 21 bits an axis, offset so that negative places stay positive.
+    fn key_of(inv_size: f64, p: [f64; 3]) -> u64 {
+        let [x, y, z] = p.map(|v| {
+            ((v * inv_size).floor() + f64::from(1 << 20)).clamp(1.0, f64::from((1 << 21) - 2))
+                as u64
+        });
+        x | y << 21 | z << 42
+    }
+
+    /// Calls `f` for every point in the cell of `p` and the 26 around it.
+    pub(crate) fn near(&self, p: [f64; 3], mut f: impl FnMut(usize)) {
+        let cell = Self::key_of(self.inv_size, p);
+        for dz in [-1i64, 0, 1] {
+            for dy in [-1i64, 0, 1] {
+                // Three cells in a row along x are neighbours in the order too.
+                let row = cell
+                    .wrapping_add_signed(dy << 21)
+                    .wrapping_add_signed(dz << 42);
+                let mut at = self.start.partition_point(|&(c, _)| c < row - 1);
+                while let Some(&(c, from)) = self.start.get(at) {
+                    if c > row + 1 {
+                        break;
                     }
+                    let to = self.start.get(at + 1).map_or(self.order.len(), |&(_, s)| s);
+                    for &k in &self.order[from..to] {
+                        f(k as usize);
+                    }
+                    at += 1;
                 }
             }
         }
     }
 }
 
-/// The cell of every vertex, the vertices sorted by cell, and where each cell starts.
-fn sort_into_cells(x: &Field, size: f64) -> (Vec<u64>, Vec<u32>, Vec<(u64, usize)>) {
+/// Sorts points into cells of edge `size`.
+pub(crate) fn sort_into_cells(x: &Field, size: f64) -> Cells {
     let n = x[0].len();
-    let r = 1.0 / size;
-    // 21 bits an axis, offset so that negative places stay positive.
-    let coordinate =
-        |v: f64| ((v * r).floor() + f64::from(1 << 20)).clamp(1.0, f64::from((1 << 21) - 2)) as u64;
-    let cells: Vec<u64> = (0..n)
-        .map(|k| coordinate(x[0][k]) | coordinate(x[1][k]) << 21 | coordinate(x[2][k]) << 42)
+    let inv_size = 1.0 / size;
+    let key: Vec<u64> = (0..n)
+        .map(|k| Cells::key_of(inv_size, [x[0][k], x[1][k], x[2][k]]))
         .collect();
     let mut order: Vec<u32> = (0..n as u32).collect();
-    order.sort_by_key(|&k| (cells[k as usize], k));
+    order.sort_unstable_by_key(|&k| (key[k as usize], k));
     let mut start: Vec<(u64, usize)> = Vec::new();
     for (at, &k) in order.iter().enumerate() {
-        let cell = cells[k as usize];
+        let cell = key[k as usize];
         if start.last().is_none_or(|&(c, _)| c != cell) {
             start.push((cell, at));
         }
     }
-    (cells, order, start)
+    Cells {
+        inv_size,
+        key,
+        order,
+        start,
+    }
 }
 
 #[cfg(test)]

@@ -14,9 +14,11 @@
 pub mod cache;
 mod clip;
 mod contact;
+mod crossing;
 mod error;
 mod fabrics;
 mod force;
+pub mod lab;
 mod line;
 mod mesh;
 pub mod preview;
@@ -31,6 +33,7 @@ mod wind;
 
 pub use clip::{CurtainClip, simulate, simulate_to};
 pub use contact::{Obstacles, SelfContact};
+pub use crossing::crossings;
 pub use error::{Error, Result};
 pub use fabrics::{FABRICS, Fabric, GRAVITY, Mechanics, bending_length, bending_stiffness, fabric};
 pub use mesh::Mesh;
@@ -40,4 +43,4 @@ pub use sheet::{Energy, Sheet};
 pub use simulation::{Frame, Report, Simulation, TICKS};
 pub use spec::CurtainSpec;
 pub use step::{Stepper, stable_step};
-pub use wind::{AIR_DENSITY, Opening, Wind, WindSpec, von_karman};
+pub use wind::{AIR_DENSITY, Opening, Wind, WindSpec, uniform_wind_forces, von_karman};

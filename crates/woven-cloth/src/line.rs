@@ -94,53 +94,58 @@ impl Block {
         let (c, r) = (&mut self.c[..n], &mut self.r[..n]);
         let before = &mut self.lambda[..n];
         let [d0, d1, d2] = &self.d;
-        let (mut px, mut py, mut pz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        let (mut cp, mut rp) = ([0.0; LANES], [0.0; LANES]);
+        // Directions, compliance and right-hand sides of all edges.
         for j in 0..n - 1 {
-            let (mut ex, mut ey, mut ez) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-            let (mut cc, mut rr) = ([0.0; LANES], [0.0; LANES]);
             for l in 0..LANES {
                 let (ax, ay, az) = (
                     x[j + 1][l] - x[j][l],
                     y[j + 1][l] - y[j][l],
                     z[j + 1][l] - z[j][l],
                 );
-                let len = (ax * ax + ay * ay + az * az).sqrt().max(1e-12);
-                let inv = 1.0 / len;
-                (ex[l], ey[l], ez[l]) = (ax * inv, ay * inv, az * inv);
-                let stretch = len - rest;
+                let l2 = (ax * ax + ay * ay + az * az).max(1e-24);
+                let inv = 1.0 / l2.sqrt();
+                let stretch = l2 * inv - rest;
+                (nx[j][l], ny[j][l], nz[j][l]) = (ax * inv, ay * inv, az * inv);
                 // A stiffening thread: the secant compliance at the present stretch.
-                let soft = alpha[l] / (1.0 + 0.5 * stiffening * (stretch * inv_rest).max(0.0));
-                // Coupling to the edge before through the vertex between: -w n·n'.
-                let b = -w[j][l] * (ex[l] * px[l] + ey[l] * py[l] + ez[l] * pz[l]) * g;
-                let a = (w[j][l] + w[j + 1][l]) * g + soft;
-                let m = 1.0 / (a - b * cp[l]).max(1e-300);
-                rr[l] = -stretch - soft * before[j][l];
-                if damping > 0.0 {
-                    let v = ex[l] * (d0[j + 1][l] - d0[j][l])
-                        + ey[l] * (d1[j + 1][l] - d1[j][l])
-                        + ez[l] * (d2[j + 1][l] - d2[j][l]);
-                    rr[l] -= damping * v;
-                }
-                rr[l] = (rr[l] - b * rp[l]) * m;
-                // The next row's off-diagonal is symmetric but needs the next direction; keep m and finish there.
-                cc[l] = m;
+                let soft = if stiffening > 0.0 {
+                    alpha[l] / (1.0 + 0.5 * stiffening * (stretch * inv_rest).max(0.0))
+                } else {
+                    alpha[l]
+                };
+                c[j][l] = soft;
+                r[j][l] = -stretch - soft * before[j][l];
             }
-            (nx[j], ny[j], nz[j]) = (ex, ey, ez);
-            // cp for the next row: c_j m with c_j = -w_{j+1} n_j·n_{j+1} g, formed from the next direction below.
-            if j + 2 < n {
+            if damping > 0.0 {
                 for l in 0..LANES {
-                    let (ax, ay, az) = (
-                        x[j + 2][l] - x[j + 1][l],
-                        y[j + 2][l] - y[j + 1][l],
-                        z[j + 2][l] - z[j + 1][l],
-                    );
-                    let inv = 1.0 / (ax * ax + ay * ay + az * az).sqrt().max(1e-12);
-                    cc[l] *= -w[j + 1][l] * (ax * ex[l] + ay * ey[l] + az * ez[l]) * inv * g;
+                    r[j][l] -= damping
+                        * (nx[j][l] * (d0[j + 1][l] - d0[j][l])
+                            + ny[j][l] * (d1[j + 1][l] - d1[j][l])
+                            + nz[j][l] * (d2[j + 1][l] - d2[j][l]));
                 }
             }
-            (c[j], r[j]) = (cc, rr);
-            (px, py, pz, cp, rp) = (ex, ey, ez, cc, rr);
+        }
+        // Forward elimination: `off` couples an edge to the one before through the vertex between them, -w n·n'.
+        let (mut cp, mut rp) = ([0.0; LANES], [0.0; LANES]);
+        let mut off = [0.0; LANES];
+        for j in 0..n - 1 {
+            let last = j + 2 >= n;
+            for l in 0..LANES {
+                let a = (w[j][l] + w[j + 1][l]) * g + c[j][l];
+                let m = 1.0 / (a - off[l] * cp[l]).max(1e-300);
+                rp[l] = (r[j][l] - off[l] * rp[l]) * m;
+                let next = if last {
+                    0.0
+                } else {
+                    -w[j + 1][l]
+                        * (nx[j][l] * nx[j + 1][l]
+                            + ny[j][l] * ny[j + 1][l]
+                            + nz[j][l] * nz[j + 1][l])
+                        * g
+                };
+                cp[l] = next * m;
+                off[l] = next;
+            }
+            (c[j], r[j]) = (cp, rp);
         }
         // Back substitution, moving the vertices on the way: vertex j+1 by w (lambda_j n_j - lambda_{j+1} n_{j+1}).
         let (mut fx, mut fy, mut fz, mut lambda) =

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use woven_cloth::lab::{Thread, peirce};
 use woven_cloth::{CurtainClip, CurtainSpec, FABRICS, Simulation, bending_length};
 
 #[derive(Parser)]
@@ -23,7 +24,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Simulate a curtain into a cache (.glb, .pc2 or .mdd)
+    /// Simulate a curtain into a cache (.glb, .pc2, .mdd or .usda)
     #[command(
         after_help = "Example:\n  woven-cloth simulate curtain.toml -o curtain.glb --frames 96 --fps 24\n\nStopped in the middle, the same command goes on where it was."
     )]
@@ -63,6 +64,18 @@ enum Command {
         /// Height in pixels
         #[arg(long, default_value_t = 480)]
         height: usize,
+    },
+    /// The virtual cantilever test (Peirce, ASTM D1388) of a fabric, beside the fabric's own bending length
+    #[command(
+        name = "test-fabric",
+        after_help = "Examples:\n  woven-cloth test-fabric voile\n  woven-cloth test-fabric curtain.toml"
+    )]
+    TestFabric {
+        /// A built-in fabric's name, or a curtain's description
+        fabric: String,
+        /// Segments of the strip
+        #[arg(long, default_value_t = 48)]
+        segments: usize,
     },
     /// List the built-in fabrics
     #[command(after_help = "Example:\n  woven-cloth fabrics")]
@@ -135,6 +148,38 @@ fn run(cli: Cli) -> anyhow::Result<()> {
             )?;
             file.persist(&output)
                 .with_context(|| format!("cannot write {}", output.display()))?;
+            Ok(())
+        }
+        Command::TestFabric { fabric, segments } => {
+            anyhow::ensure!(
+                (8..=256).contains(&segments),
+                "--segments {segments} is outside 8 to 256"
+            );
+            let path = std::path::Path::new(&fabric);
+            let mechanics = if path.extension().is_some() {
+                CurtainSpec::read(path)?.mechanics()?
+            } else {
+                woven_cloth::fabric(&fabric)?.mechanics()
+            };
+            println!("{fabric}: {:.0} g/m2", mechanics.areal_density * 1e3);
+            for (thread, name, b) in [
+                (Thread::Warp, "warp", mechanics.bending()[0]),
+                (Thread::Weft, "weft", mechanics.bending()[1]),
+            ] {
+                anyhow::ensure!(
+                    b > 0.0,
+                    "the bending stiffness along the {name} is 0, so the strip hangs straight down; nothing to measure"
+                );
+                let (own, found) = (
+                    bending_length(b, mechanics.areal_density) * 1e3,
+                    peirce(&mechanics, thread, segments) * 1e3,
+                );
+                println!(
+                    "  {name}: B {:.2} uN m, bending length {own:.2} mm; cantilever of {segments} segments finds {found:.2} mm ({:+.2} %)",
+                    b * 1e6,
+                    (found / own - 1.0) * 100.0
+                );
+            }
             Ok(())
         }
         Command::Fabrics => {

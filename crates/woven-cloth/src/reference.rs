@@ -42,8 +42,15 @@ impl Reference {
         }
     }
 
-    /// Half a kick, so that velocities lie half a step from positions (leapfrog): called once, it makes the scheme second order.
-    pub fn half_kick(&mut self, sheet: &mut Sheet) {
+    /// Puts the velocities half a step before the positions (leapfrog), which makes the scheme second order; called once at the
+    /// start with velocities that belong to the positions.
+    pub fn begin(&mut self, sheet: &mut Sheet) {
+        self.forces(sheet);
+        self.kick(sheet, -0.5 * self.dt);
+    }
+
+    /// Brings the velocities to the time of the positions, to ask for the energy; `begin` again before going on.
+    pub fn finish(&mut self, sheet: &mut Sheet) {
         self.forces(sheet);
         self.kick(sheet, 0.5 * self.dt);
     }

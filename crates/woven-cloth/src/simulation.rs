@@ -107,7 +107,7 @@ impl Simulation {
         stepper.obstacles = spec.obstacles.clone();
         if spec.self_contact {
             // The grid's spacing is the least that keeps a vertex from slipping between the corners of a cell.
-            let distance = (0.7 * sheet.hx.max(sheet.hy)).max(sheet.mechanics.thickness);
+            let distance = sheet.hx.max(sheet.hy).max(sheet.mechanics.thickness);
             stepper.self_contact = Some(SelfContact::new(distance, spec.friction));
         }
         let drag = Drag::new(&sheet.mechanics, spec.wind.tangential, spec.wind.speed);

@@ -35,7 +35,7 @@ pub struct Stepper {
     /// False until there are two steps to look back on.
     pub(crate) history: bool,
     /// Force of the air, held over the steps of a tick, N.
-    pub(crate) air: Field,
+    pub air: [Vec<f64>; 3],
     /// Damping of the absolute velocity, 1/s: 0 but while settling.
     pub settling: f64,
     /// Planes and boxes that the cloth cannot enter.

@@ -412,6 +412,33 @@ pub(crate) fn air_forces(sheet: &Sheet, air: &AirState, s: f64, drag: Drag, f: &
     }
 }
 
+/// Forces of a uniform wind (m/s) on a sheet, N, with the normal drag coefficient `c_n` and no tangential part.
+#[must_use]
+pub fn uniform_wind_forces(sheet: &Sheet, wind: [f64; 3], c_n: f64) -> [Vec<f64>; 3] {
+    let cells = (sheet.nx - 1) * (sheet.ny - 1);
+    let air: Field = wind.map(|w| vec![w; cells]);
+    let air = AirState {
+        now: air.clone(),
+        next: air,
+    };
+    let mut f = [
+        vec![0.0; sheet.len()],
+        vec![0.0; sheet.len()],
+        vec![0.0; sheet.len()],
+    ];
+    air_forces(
+        sheet,
+        &air,
+        0.0,
+        Drag {
+            normal: 0.5 * AIR_DENSITY * c_n,
+            tangential: 0.0,
+        },
+        &mut f,
+    );
+    f
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -67,6 +67,17 @@ fn pc2_reads_back_exactly_and_mdd_has_its_length() {
     for (a, b) in back.frames.iter().zip(&clip.frames) {
         assert_eq!(a.positions, b.positions);
     }
+    let usd = folder.path().join("c.usda");
+    clip.write(&usd).unwrap();
+    let text = std::fs::read_to_string(&usd).unwrap();
+    // The third sample's points, read back from the text, have the same bits.
+    let samples = &text[text.find("points.timeSamples").unwrap()..];
+    let sample = &samples[samples.find("\n        2: ").unwrap() + 12..];
+    let numbers: Vec<f32> = sample[..sample.find(']').unwrap()]
+        .split(|c: char| "[](), ".contains(c))
+        .filter_map(|n| n.parse().ok())
+        .collect();
+    assert_eq!(numbers, clip.frames[2].positions.as_flattened());
     let mdd = folder.path().join("c.mdd");
     clip.write(&mdd).unwrap();
     assert_eq!(

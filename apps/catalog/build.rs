@@ -5,7 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders, from this one, whose `.rs`, `.wgsl`, `.css` and `.js` files decide what a catalog looks like.
-const SOURCES: [&str; 5] = ["src", "../../crates/woven-bsdf/src", "../../crates/woven-fit/src", "../../crates/woven-cloth/src", "../../crates/woven-render/src"];
+const SOURCES: [&str; 5] = [
+    "src",
+    "../../crates/woven-bsdf/src",
+    "../../crates/woven-fit/src",
+    "../../crates/woven-cloth/src",
+    "../../crates/woven-render/src",
+];
 
 fn main() {
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
@@ -21,13 +27,23 @@ fn main() {
 /// Writes a table of (name, contents) of the files in `folder`, in the order of their names.
 fn embed(folder: &Path) {
     println!("cargo::rerun-if-changed={}", folder.display());
-    let mut paths: Vec<PathBuf> = fs::read_dir(folder).map(|entries| entries.filter_map(|e| e.ok().map(|e| e.path())).collect()).unwrap_or_default();
-    paths.retain(|p| p.is_file() && !p.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.')));
+    let mut paths: Vec<PathBuf> = fs::read_dir(folder)
+        .map(|entries| entries.filter_map(|e| e.ok().map(|e| e.path())).collect())
+        .unwrap_or_default();
+    paths.retain(|p| {
+        p.is_file()
+            && !p
+                .file_name()
+                .is_some_and(|n| n.to_string_lossy().starts_with('.'))
+    });
     paths.sort();
     let mut table = String::from("&[\n");
     for path in paths {
         let path = path.canonicalize().unwrap_or(path);
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = path
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
         table += &format!("    ({name:?}, include_bytes!({path:?}) as &[u8]),\n");
     }
     table += "]\n";
@@ -37,14 +53,24 @@ fn embed(folder: &Path) {
 
 /// Takes in the files of a folder in the order of their names; `\r` is passed over, for checkouts with other line ends.
 fn visit(root: &Path, folder: &Path, hash: &mut Fnv) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
+    let Ok(entries) = fs::read_dir(folder) else {
+        return;
+    };
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| e.ok().map(|e| e.path())).collect();
     paths.sort();
     for path in paths {
         if path.is_dir() {
             visit(root, &path, hash);
-        } else if path.extension().and_then(|e| e.to_str()).is_some_and(|e| ["rs", "wgsl", "css", "js"].contains(&e)) {
-            let name = path.strip_prefix(root).unwrap_or(&path).to_string_lossy().replace('\\', "/");
+        } else if path
+            .extension()
+            .and_then(|e| e.to_str())
+            .is_some_and(|e| ["rs", "wgsl", "css", "js"].contains(&e))
+        {
+            let name = path
+                .strip_prefix(root)
+                .unwrap_or(&path)
+                .to_string_lossy()
+                .replace('\\', "/");
             hash.take(name.as_bytes());
             hash.take(&fs::read(&path).unwrap_or_default());
         }

@@ -24,6 +24,9 @@ pub struct Catalog {
     /// The fabrics in the order of the page.
     #[serde(rename = "fabric")]
     pub fabrics: Vec<FabricSpec>,
+    /// How the measurements are fitted.
+    #[serde(default)]
+    pub fit: Fit,
     /// How the curtains move.
     #[serde(default)]
     pub motion: Motion,
@@ -73,6 +76,30 @@ fn drape() -> String {
     "drape".to_owned()
 }
 
+/// How the measurements are fitted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Fit {
+    /// The models that are ranked; the sheet, which is rendered, is always among them. See `woven-fit models`.
+    pub models: Vec<String>,
+    /// Starts of the solver for each model.
+    pub starts: usize,
+    /// Chooses the starts.
+    pub seed: u64,
+}
+
+impl Default for Fit {
+    fn default() -> Self {
+        Self {
+            models: ["sheet", "ggx-mirrored", "ward", "lambert"]
+                .map(str::to_owned)
+                .to_vec(),
+            starts: 8,
+            seed: 1,
+        }
+    }
+}
+
 /// How the curtains move.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -95,7 +122,15 @@ pub struct Motion {
 
 impl Default for Motion {
     fn default() -> Self {
-        Self { frames: 60, fps: 24, blend: 16, wind: 1.6, gusts: 0.5, seed: 7, mesh: [112, 72] }
+        Self {
+            frames: 48,
+            fps: 24,
+            blend: 16,
+            wind: 1.6,
+            gusts: 0.5,
+            seed: 7,
+            mesh: [112, 72],
+        }
     }
 }
 
@@ -119,7 +154,32 @@ pub struct Picture {
 
 impl Default for Picture {
     fn default() -> Self {
-        Self { size: [480, 360], samples: 24, still_samples: 96, depth: 5, seed: 1, denoise: true }
+        Self {
+            size: [480, 360],
+            samples: 6,
+            still_samples: 64,
+            depth: 4,
+            seed: 1,
+            denoise: true,
+        }
+    }
+}
+
+impl Picture {
+    /// Paths a pixel of a frame in a light: lamps leave less noise than sun and sky.
+    #[must_use]
+    pub fn samples_in(&self, light: Preset) -> u32 {
+        if light == Preset::Evening {
+            self.samples.div_ceil(2)
+        } else {
+            self.samples
+        }
+    }
+
+    /// Paths a pixel of the light desk's pictures.
+    #[must_use]
+    pub fn desk_samples(&self) -> u32 {
+        self.still_samples.div_ceil(2)
     }
 }
 
@@ -140,7 +200,8 @@ impl Catalog {
     /// # Errors
     /// A sentence that names the file and the place in it.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("The catalog {} cannot be read", path.display()))?;
+        let text = std::fs::read_to_string(path)
+            .with_context(|| format!("The catalog {} cannot be read", path.display()))?;
         Self::parse(&text).with_context(|| format!("The catalog {} cannot be used", path.display()))
     }
 
@@ -156,8 +217,24 @@ impl Catalog {
 
     /// Makes everything small and coarse, for a look within two minutes.
     pub fn quicken(&mut self) {
-        self.motion = Motion { frames: self.motion.frames.min(24), blend: self.motion.blend.min(8), mesh: [72, 40], ..self.motion };
-        self.picture = Picture { size: [240, 180], samples: 8, still_samples: 24, depth: self.picture.depth.min(4), ..self.picture };
+        self.fit = Fit {
+            models: vec!["sheet".to_owned(), "lambert".to_owned()],
+            starts: self.fit.starts.min(3),
+            seed: self.fit.seed,
+        };
+        self.motion = Motion {
+            frames: self.motion.frames.min(24),
+            blend: self.motion.blend.min(8),
+            mesh: [72, 40],
+            ..self.motion
+        };
+        self.picture = Picture {
+            size: [240, 180],
+            samples: 4,
+            still_samples: 16,
+            depth: self.picture.depth.min(4),
+            ..self.picture
+        };
     }
 
     /// Makes sure that every value can be worked with.
@@ -165,31 +242,94 @@ impl Catalog {
     /// # Errors
     /// A sentence that names the value and what it may be.
     pub fn check(&self) -> Result<()> {
-        ensure!(!self.fabrics.is_empty(), "it has no [[fabric]]; there must be at least one");
-        ensure!(!self.lights.is_empty(), "`lights` is empty; it takes \"day\" and \"evening\"");
+        ensure!(
+            !self.fabrics.is_empty(),
+            "it has no [[fabric]]; there must be at least one"
+        );
+        ensure!(
+            !self.lights.is_empty(),
+            "`lights` is empty; it takes \"day\" and \"evening\""
+        );
         for (i, light) in self.lights.iter().enumerate() {
-            ensure!(*light != Preset::All && !self.lights[..i].contains(light), "`lights` takes \"day\" and \"evening\", each once");
+            ensure!(
+                *light != Preset::All && !self.lights[..i].contains(light),
+                "`lights` takes \"day\" and \"evening\", each once"
+            );
         }
         for (i, fabric) in self.fabrics.iter().enumerate() {
             let id = &fabric.id;
-            let plain = !id.is_empty() && id.len() <= 60 && id.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-');
-            ensure!(plain && id != "work", "fabric id \"{id}\" is not usable in file names; use lower-case letters, digits and hyphens (and not \"work\")");
-            ensure!(!self.fabrics[..i].iter().any(|f| f.id == *id), "two fabrics have the id \"{id}\"");
-            ensure!(fabric.grams.is_none_or(|g| (5.0..=2000.0).contains(&g)), "fabric \"{id}\": grams must lie between 5 and 2000");
+            let plain = !id.is_empty()
+                && id.len() <= 60
+                && id
+                    .bytes()
+                    .all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-');
+            ensure!(
+                plain && id != "work",
+                "fabric id \"{id}\" is not usable in file names; use lower-case letters, digits and hyphens (and not \"work\")"
+            );
+            ensure!(
+                !self.fabrics[..i].iter().any(|f| f.id == *id),
+                "two fabrics have the id \"{id}\""
+            );
+            ensure!(
+                fabric.grams.is_none_or(|g| (5.0..=2000.0).contains(&g)),
+                "fabric \"{id}\": grams must lie between 5 and 2000"
+            );
             if let Some(tint) = fabric.tint {
-                ensure!(tint.iter().all(|t| t.is_finite() && (0.0..=4.0).contains(t)), "fabric \"{id}\": tint must be three numbers from 0 to 4");
+                ensure!(
+                    tint.iter()
+                        .all(|t| t.is_finite() && (0.0..=4.0).contains(t)),
+                    "fabric \"{id}\": tint must be three numbers from 0 to 4"
+                );
             }
         }
+        ensure!(
+            (1..=1000).contains(&self.fit.starts),
+            "fit.starts is {}; it must lie between 1 and 1000",
+            self.fit.starts
+        );
+        woven_fit::fit::models_named(Some(&self.fit.models)).context("fit.models")?;
         let (m, p) = (&self.motion, &self.picture);
-        ensure!((1..=240).contains(&m.frames), "motion.frames is {}; it must lie between 1 and 240", m.frames);
-        ensure!((1..=120).contains(&m.fps), "motion.fps is {}; it must lie between 1 and 120", m.fps);
-        ensure!(m.blend <= m.frames, "motion.blend is {}, more than the {} frames there are", m.blend, m.frames);
-        ensure!((0.0..=10.0).contains(&m.wind), "motion.wind is {} m/s; it must lie between 0 and 10", m.wind);
-        ensure!((0.0..=2.0).contains(&m.gusts), "motion.gusts is {}; it must lie between 0 and 2", m.gusts);
-        ensure!(m.mesh.iter().all(|n| (8..=512).contains(n)), "motion.mesh must be two numbers from 8 to 512");
+        ensure!(
+            (1..=240).contains(&m.frames),
+            "motion.frames is {}; it must lie between 1 and 240",
+            m.frames
+        );
+        ensure!(
+            (1..=120).contains(&m.fps),
+            "motion.fps is {}; it must lie between 1 and 120",
+            m.fps
+        );
+        ensure!(
+            m.blend <= m.frames,
+            "motion.blend is {}, more than the {} frames there are",
+            m.blend,
+            m.frames
+        );
+        ensure!(
+            (0.0..=10.0).contains(&m.wind),
+            "motion.wind is {} m/s; it must lie between 0 and 10",
+            m.wind
+        );
+        ensure!(
+            (0.0..=2.0).contains(&m.gusts),
+            "motion.gusts is {}; it must lie between 0 and 2",
+            m.gusts
+        );
+        ensure!(
+            m.mesh.iter().all(|n| (8..=512).contains(n)),
+            "motion.mesh must be two numbers from 8 to 512"
+        );
         video::check_size(p.size[0], p.size[1])?;
-        ensure!((1..=65_536).contains(&p.samples) && (1..=65_536).contains(&p.still_samples), "picture.samples and still_samples must lie between 1 and 65536");
-        ensure!((1..=64).contains(&p.depth), "picture.depth is {}; it must lie between 1 and 64", p.depth);
+        ensure!(
+            (1..=65_536).contains(&p.samples) && (1..=65_536).contains(&p.still_samples),
+            "picture.samples and still_samples must lie between 1 and 65536"
+        );
+        ensure!(
+            (1..=64).contains(&p.depth),
+            "picture.depth is {}; it must lie between 1 and 64",
+            p.depth
+        );
         Ok(())
     }
 }
@@ -215,14 +355,37 @@ impl FabricSpec {
     pub fn measurement(&self, folder: &Path) -> Result<Measurement> {
         if let Some(name) = self.measurement.strip_prefix("builtin:") {
             let Some(bytes) = assets::measurement(name) else {
-                bail!("Fabric \"{}\" wants the built-in measurement \"{name}\", but there are only: {}.", self.id, assets::names().join(", "));
+                bail!(
+                    "Fabric \"{}\" wants the built-in measurement \"{name}\", but there are only: {}.",
+                    self.id,
+                    assets::names().join(", ")
+                );
             };
-            return Ok(Measurement { file: name.to_owned(), path: PathBuf::from(name), bytes: bytes.to_vec(), builtin: true });
+            return Ok(Measurement {
+                file: name.to_owned(),
+                path: PathBuf::from(name),
+                bytes: bytes.to_vec(),
+                builtin: true,
+            });
         }
         let path: PathBuf = folder.join(&self.measurement);
-        let bytes = std::fs::read(&path).with_context(|| format!("The measurement {} of fabric \"{}\" cannot be read", path.display(), self.id))?;
-        let file = path.file_name().map_or_else(|| "measurement".to_owned(), |n| n.to_string_lossy().into_owned());
-        Ok(Measurement { file, path, bytes, builtin: false })
+        let bytes = std::fs::read(&path).with_context(|| {
+            format!(
+                "The measurement {} of fabric \"{}\" cannot be read",
+                path.display(),
+                self.id
+            )
+        })?;
+        let file = path.file_name().map_or_else(
+            || "measurement".to_owned(),
+            |n| n.to_string_lossy().into_owned(),
+        );
+        Ok(Measurement {
+            file,
+            path,
+            bytes,
+            builtin: false,
+        })
     }
 }
 
@@ -230,7 +393,8 @@ impl FabricSpec {
 mod tests {
     use super::*;
 
-    const SMALL: &str = "title = \"T\"\n[[fabric]]\nid = \"a\"\nname = \"A\"\nmeasurement = \"a.xml\"\n";
+    const SMALL: &str =
+        "title = \"T\"\n[[fabric]]\nid = \"a\"\nname = \"A\"\nmeasurement = \"a.xml\"\n";
 
     fn complaint(text: &str) -> String {
         format!("{:#}", Catalog::parse(text).unwrap_err())
@@ -244,7 +408,14 @@ mod tests {
         assert!(catalog.motion.frames >= 48 && catalog.motion.frames >= 2 * catalog.motion.fps);
         assert!(catalog.picture.size[0] >= 480 && catalog.picture.size[1] >= 360);
         for fabric in &catalog.fabrics {
-            assert!(fabric.measurement(Path::new("nowhere")).unwrap().bytes.len() > 10_000);
+            assert!(
+                fabric
+                    .measurement(Path::new("nowhere"))
+                    .unwrap()
+                    .bytes
+                    .len()
+                    > 10_000
+            );
             assert!(!fabric.licence.is_empty() && !fabric.source.is_empty());
         }
     }
@@ -258,15 +429,32 @@ mod tests {
         assert!(complaint(&format!("{SMALL}[picture]\nsize = [481, 360]\n")).contains("odd side"));
         assert!(complaint(&format!("{SMALL}[motion]\nframes = 0\n")).contains("motion.frames"));
         assert!(complaint(&format!("lights = [\"noon\"]\n{SMALL}")).contains("noon"));
-        assert!(complaint(&format!("{SMALL}[[fabric]]\nid = \"a\"\nname = \"B\"\nmeasurement = \"b.xml\"\n")).contains("two fabrics"));
+        assert!(
+            complaint(&format!(
+                "{SMALL}[[fabric]]\nid = \"a\"\nname = \"B\"\nmeasurement = \"b.xml\"\n"
+            ))
+            .contains("two fabrics")
+        );
         assert!(complaint("title = \"T\"\nfabric = []\n").contains("[[fabric]]"));
     }
 
     #[test]
     fn a_missing_measurement_is_named() {
         let mut fabric = Catalog::parse(SMALL).unwrap().fabrics.remove(0);
-        assert!(format!("{:#}", fabric.measurement(Path::new("nowhere")).unwrap_err()).contains("a.xml"));
+        assert!(
+            format!(
+                "{:#}",
+                fabric.measurement(Path::new("nowhere")).unwrap_err()
+            )
+            .contains("a.xml")
+        );
         fabric.measurement = "builtin:velvet.xml".to_owned();
-        assert!(fabric.measurement(Path::new("nowhere")).unwrap_err().to_string().contains("there are only"));
+        assert!(
+            fabric
+                .measurement(Path::new("nowhere"))
+                .unwrap_err()
+                .to_string()
+                .contains("there are only")
+        );
     }
 }

@@ -5,11 +5,15 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result};
 use glam::{Vec2, Vec3};
-use woven_cloth::{CurtainClip, CurtainSpec, Frame, Heading, Obstacles, Opening, WindSpec, fabric, simulate};
+use woven_cloth::{
+    CurtainClip, CurtainSpec, Frame, Heading, Obstacles, Opening, WindSpec, fabric, simulate,
+};
 
 use crate::catalog::{FabricSpec, Motion};
 use crate::looping;
-use crate::stage::{CURTAIN_SPAN, CurtainMesh, HEM_HEIGHT, OPENING, RAIL_DISTANCE, RAIL_HEIGHT, WALL};
+use crate::stage::{
+    CURTAIN_SPAN, CurtainMesh, HEM_HEIGHT, OPENING, RAIL_DISTANCE, RAIL_HEIGHT, WALL,
+};
 
 /// Seconds beyond the loop's own length in which a stretch is looked for that meets itself.
 const SEARCH: f64 = 1.5;
@@ -19,7 +23,9 @@ const SEARCH: f64 = 1.5;
 /// # Errors
 /// When the fabric's mechanics are not in the table, or a value is outside its limits.
 pub fn spec(cloth: &FabricSpec, openness: f64, motion: &Motion) -> Result<CurtainSpec> {
-    let mut mechanics = fabric(&cloth.mechanics).with_context(|| format!("Fabric \"{}\"", cloth.id))?.mechanics();
+    let mut mechanics = fabric(&cloth.mechanics)
+        .with_context(|| format!("Fabric \"{}\"", cloth.id))?
+        .mechanics();
     if let Some(grams) = cloth.grams {
         mechanics.areal_density = grams * 1e-3;
     }
@@ -32,7 +38,11 @@ pub fn spec(cloth: &FabricSpec, openness: f64, motion: &Motion) -> Result<Curtai
         z: f64::from(-WALL - RAIL_DISTANCE),
     };
     let width = f64::from(CURTAIN_SPAN.1 - CURTAIN_SPAN.0);
-    let extra = if motion.blend > 0 { f64::from(motion.blend) + SEARCH * f64::from(motion.fps) } else { 0.0 };
+    let extra = if motion.blend > 0 {
+        f64::from(motion.blend) + SEARCH * f64::from(motion.fps)
+    } else {
+        0.0
+    };
     let spec = CurtainSpec {
         width,
         height: f64::from(RAIL_HEIGHT - HEM_HEIGHT),
@@ -67,7 +77,8 @@ pub fn spec(cloth: &FabricSpec, openness: f64, motion: &Motion) -> Result<Curtai
         seed: motion.seed,
         ..CurtainSpec::default()
     };
-    spec.validate().with_context(|| format!("Fabric \"{}\"", cloth.id))?;
+    spec.validate()
+        .with_context(|| format!("Fabric \"{}\"", cloth.id))?;
     Ok(spec)
 }
 
@@ -75,20 +86,43 @@ pub fn spec(cloth: &FabricSpec, openness: f64, motion: &Motion) -> Result<Curtai
 ///
 /// # Errors
 /// When the cloth blows up, or on request.
-pub fn run(spec: &CurtainSpec, motion: &Motion, progress: &mut dyn FnMut(f64) -> bool) -> Result<CurtainClip> {
+pub fn run(
+    spec: &CurtainSpec,
+    motion: &Motion,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Result<CurtainClip> {
     let clip = simulate(spec, &mut |done, total| {
-        if progress(done as f64 / total as f64) { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if progress(done as f64 / total as f64) {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
     })?;
-    let frames: Vec<Vec<Vec3>> = clip.frames.iter().map(|f| f.positions.iter().copied().map(Vec3::from).collect()).collect();
+    let frames: Vec<Vec<Vec3>> = clip
+        .frames
+        .iter()
+        .map(|f| f.positions.iter().copied().map(Vec3::from).collect())
+        .collect();
     let (count, blend) = (motion.frames as usize, motion.blend as usize);
     let start = looping::best_start(&frames, count, blend);
     let closed = looping::close(&frames, start, count, blend);
     let triangles = triangles(&clip);
     let frames = closed.into_iter().map(|positions| {
-        let normals = looping::normals(&positions, &triangles).into_iter().map(|v| v.to_array()).collect();
-        Frame { velocities: vec![[0.0; 3]; positions.len()], normals, positions: positions.into_iter().map(|v| v.to_array()).collect() }
+        let normals = looping::normals(&positions, &triangles)
+            .into_iter()
+            .map(|v| v.to_array())
+            .collect();
+        Frame {
+            velocities: vec![[0.0; 3]; positions.len()],
+            normals,
+            positions: positions.into_iter().map(|v| v.to_array()).collect(),
+        }
     });
-    Ok(CurtainClip { frames: frames.collect(), mesh: clip.mesh, fps: clip.fps })
+    Ok(CurtainClip {
+        frames: frames.collect(),
+        mesh: clip.mesh,
+        fps: clip.fps,
+    })
 }
 
 /// The clip as the bytes of an animated `.glb`.
@@ -111,7 +145,11 @@ pub fn read(path: &Path) -> Result<CurtainClip> {
 }
 
 fn triangles(clip: &CurtainClip) -> Vec<[u32; 3]> {
-    clip.mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+    clip.mesh
+        .indices
+        .chunks_exact(3)
+        .map(|t| [t[0], t[1], t[2]])
+        .collect()
 }
 
 /// The curtain in the stage's world: at rest, or in one of its frames.
@@ -126,7 +164,12 @@ pub fn mesh(clip: &CurtainClip, frame: Option<usize>) -> CurtainMesh {
     CurtainMesh {
         positions: positions.iter().map(|p| Vec3::from(*p) + place).collect(),
         normals: normals.iter().copied().map(Vec3::from).collect(),
-        uvs: clip.mesh.uvs.iter().map(|uv| Vec2::from(*uv) * size).collect(),
+        uvs: clip
+            .mesh
+            .uvs
+            .iter()
+            .map(|uv| Vec2::from(*uv) * size)
+            .collect(),
         indices: triangles(clip),
     }
 }

@@ -10,6 +10,7 @@ use image::RgbImage;
 use woven_bsdf::fabric::Fabric;
 use woven_cloth::{CurtainClip, CurtainSpec};
 
+use crate::anchor::Anchor;
 use crate::catalog::{Catalog, FabricSpec, Measurement};
 use crate::optics::Summary;
 use crate::picture::{Choice, Photographer, Set, Shoot};
@@ -79,8 +80,6 @@ struct Shot {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// The curtain at rest in a light.
-    Still(Preset),
     /// The curtain at rest, one picture a light.
     Desk,
     /// A frame of the motion in a light.
@@ -96,7 +95,12 @@ struct Stopped;
 ///
 /// # Errors
 /// A sentence: what could not be done, and which file it was.
-pub fn run(catalog: &Catalog, folder: &Path, order: &Order, stop: Arc<AtomicBool>) -> Result<Outcome> {
+pub fn run(
+    catalog: &Catalog,
+    folder: &Path,
+    order: &Order,
+    stop: Arc<AtomicBool>,
+) -> Result<Outcome> {
     match Run::start(catalog, folder, order, stop).and_then(|mut run| run.all()) {
         Err(e) if e.is::<Stopped>() => Ok(Outcome::Stopped),
         other => other,
@@ -108,7 +112,9 @@ const FIT_WORK: f64 = 12.0;
 /// Work of a simulated frame per vertex of the mesh.
 const CLOTH_WORK: f64 = 3.0e-5;
 /// Work of a path.
-const PATH_WORK: f64 = 1.2e-6;
+const PATH_WORK: f64 = 1.5e-6;
+/// Work of filtering a pixel.
+const FILTER_WORK: f64 = 2.0e-6;
 /// Work of encoding a pixel of a video.
 const VIDEO_WORK: f64 = 1.5e-7;
 
@@ -123,7 +129,12 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     /// Reads and checks everything that can be wrong before the first long piece of work.
-    fn start(catalog: &'a Catalog, folder: &Path, order: &'a Order, stop: Arc<AtomicBool>) -> Result<Self> {
+    fn start(
+        catalog: &'a Catalog,
+        folder: &Path,
+        order: &'a Order,
+        stop: Arc<AtomicBool>,
+    ) -> Result<Self> {
         let mut measurements = Vec::new();
         for spec in &catalog.fabrics {
             measurements.push(spec.measurement(folder)?);
@@ -133,9 +144,23 @@ impl<'a> Run<'a> {
         let photographer = Photographer::choose(order.backend)?;
         eprintln!("{}", photographer.why());
         let clips = catalog.fabrics.len() as f64 * (FIT_WORK + clip_work(catalog));
-        let shots: f64 = shots(catalog).iter().filter(|(i, _)| mine(order, *i)).map(|(_, s)| s.work).sum();
-        let total = clips + shots + video_work(catalog) * (catalog.fabrics.len() * catalog.lights.len()) as f64;
-        Ok(Self { catalog, order, store, measurements, photographer, progress: Progress::new(total, stop) })
+        let shots: f64 = shots(catalog)
+            .iter()
+            .filter(|(i, _)| mine(order, *i))
+            .map(|(_, s)| s.work)
+            .sum();
+        let total = clips
+            + shots
+            + (still_work(catalog) + video_work(catalog))
+                * (catalog.fabrics.len() * catalog.lights.len()) as f64;
+        Ok(Self {
+            catalog,
+            order,
+            store,
+            measurements,
+            photographer,
+            progress: Progress::new(total, stop),
+        })
     }
 
     fn all(&mut self) -> Result<Outcome> {
@@ -143,7 +168,13 @@ impl<'a> Run<'a> {
         for index in 0..self.catalog.fabrics.len() {
             subjects.push(self.subject(index)?);
         }
-        // Stills first: after a few minutes there is something to look at.
+        // Stills first: after a few minutes there is something to look at. Every shard needs them for its frames.
+        let mut anchors = Vec::new();
+        for subject in &subjects {
+            for &light in &self.catalog.lights {
+                anchors.push(self.still(subject, light)?);
+            }
+        }
         let mut ready: Option<((usize, Preset), Set)> = None;
         let mut missing = 0;
         for (index, shot) in shots(self.catalog) {
@@ -165,7 +196,16 @@ impl<'a> Run<'a> {
                 Some((is, set)) if is == wanted => set,
                 _ => self.set_up(subject, wanted.1)?,
             };
-            let bytes = self.take(subject, &mut set, &shot)?;
+            let anchor = match shot.kind {
+                Kind::Frame(light, _) => self
+                    .catalog
+                    .lights
+                    .iter()
+                    .position(|l| *l == light)
+                    .map(|l| &anchors[shot.subject * self.catalog.lights.len() + l]),
+                Kind::Desk => None,
+            };
+            let bytes = self.take(subject, &mut set, &shot, anchor)?;
             ready = Some((wanted, set));
             self.store.put(&shot.name, &key, &bytes)?;
             self.progress.add(shot.work);
@@ -208,28 +248,48 @@ impl<'a> Run<'a> {
         let path = self.put_measurement(&spec, &measurement)?;
         self.check_stop()?;
 
-        let seed = self.catalog.picture.seed.to_string();
+        let how = serde_json::to_string(&self.catalog.fit)?;
         let tint = format!("{:?}", spec.tint);
         let hash = sha256(&measurement.bytes);
-        let key = Key::new("fit", &[("measurement", &hash), ("seed", &seed), ("name", &spec.name), ("maker", &spec.maker), ("tint", &tint)]);
+        let key = Key::new(
+            "fit",
+            &[
+                ("measurement", &hash),
+                ("fit", &how),
+                ("name", &spec.name),
+                ("maker", &spec.maker),
+                ("tint", &tint),
+            ],
+        );
         let (fabric_name, summary_name) = (format!("{id}/fabric.toml"), format!("{id}/fit.json"));
-        let (fabric_text, summary) = match (self.store.get(&fabric_name, &key), self.store.get(&summary_name, &key)) {
+        let (fabric_text, summary) = match (
+            self.store.get(&fabric_name, &key),
+            self.store.get(&summary_name, &key),
+        ) {
             (Some(fabric), Some(summary)) => {
                 self.progress.skip(FIT_WORK);
-                (String::from_utf8(fabric)?, serde_json::from_slice(&summary)?)
+                (
+                    String::from_utf8(fabric)?,
+                    serde_json::from_slice(&summary)?,
+                )
             }
             _ => {
                 self.progress.say(&format!("{}: fitting", spec.name));
                 let progress = &self.progress;
-                let fitted = optics::fit(&path, &spec, self.catalog.picture.seed, &|share| {
+                let fitted = optics::fit(&path, &spec, &self.catalog.fit, &|share| {
                     progress.show(share * FIT_WORK);
                     !progress.stopped()
                 });
                 let fitted = self.or_stopped(fitted)?;
                 let text = fitted.fabric.to_toml();
-                self.store.put(&format!("{id}/fit.html"), &key, fitted.report.as_bytes())?;
+                self.store
+                    .put(&format!("{id}/fit.html"), &key, fitted.report.as_bytes())?;
                 self.store.put(&fabric_name, &key, text.as_bytes())?;
-                self.store.put(&summary_name, &key, &serde_json::to_vec_pretty(&fitted.summary)?)?;
+                self.store.put(
+                    &summary_name,
+                    &key,
+                    &serde_json::to_vec_pretty(&fitted.summary)?,
+                )?;
                 self.progress.add(FIT_WORK);
                 (text, fitted.summary)
             }
@@ -237,12 +297,25 @@ impl<'a> Run<'a> {
         let fabric = Fabric::from_toml(&fabric_text)?;
         let curtain = cloth::spec(&spec, summary.openness, &self.catalog.motion)?;
         let (clip, clip_hash) = self.clip(&spec, &curtain)?;
-        Ok(Subject { spec, measurement, fabric, summary, fabric_hash: sha256(fabric_text.as_bytes()), clip_hash, clip })
+        Ok(Subject {
+            spec,
+            measurement,
+            fabric,
+            summary,
+            fabric_hash: sha256(fabric_text.as_bytes()),
+            clip_hash,
+            clip,
+        })
     }
 
     /// A carried measurement is put beside the page, with its notices; another one is read where it is.
     fn put_measurement(&self, spec: &FabricSpec, measurement: &Measurement) -> Result<PathBuf> {
-        let path = if measurement.builtin { self.store.path(&format!("{}/{}", spec.id, measurement.file)) } else { measurement.path.clone() };
+        let path = if measurement.builtin {
+            self.store
+                .path(&format!("{}/{}", spec.id, measurement.file))
+        } else {
+            measurement.path.clone()
+        };
         if measurement.builtin {
             let mut files: Vec<(&str, &[u8])> = assets::notices();
             files.push((&measurement.file, &measurement.bytes));
@@ -260,11 +333,18 @@ impl<'a> Run<'a> {
     fn clip(&mut self, spec: &FabricSpec, curtain: &CurtainSpec) -> Result<(CurtainClip, String)> {
         let name = format!("{}/curtain.glb", spec.id);
         let motion = self.catalog.motion;
-        let key = Key::new("clip", &[("curtain", &serde_json::to_string(curtain)?), ("motion", &serde_json::to_string(&motion)?)]);
+        let key = Key::new(
+            "clip",
+            &[
+                ("curtain", &serde_json::to_string(curtain)?),
+                ("motion", &serde_json::to_string(&motion)?),
+            ],
+        );
         let work = clip_work(self.catalog);
         if self.store.get(&name, &key).is_none() {
             self.check_stop()?;
-            self.progress.say(&format!("{}: hanging it in the wind", spec.name));
+            self.progress
+                .say(&format!("{}: hanging it in the wind", spec.name));
             let progress = &self.progress;
             let made = cloth::run(curtain, &motion, &mut |share| {
                 progress.show(share * work);
@@ -277,32 +357,78 @@ impl<'a> Run<'a> {
             self.progress.skip(work);
         }
         // Always from the file: a run that goes on sees the same numbers as one that never stopped.
-        let bytes = self.store.get(&name, &key).with_context(|| format!("{name} vanished from the output folder while it was in use"))?;
+        let bytes = self.store.get(&name, &key).with_context(|| {
+            format!("{name} vanished from the output folder while it was in use")
+        })?;
         Ok((cloth::read(&self.store.path(&name))?, sha256(&bytes)))
     }
 
     /// What a picture is made from.
     fn shot_key(&self, subject: &Subject, kind: Kind) -> Key {
-        let picture = &self.catalog.picture;
-        let (samples, frame) = match kind {
-            Kind::Still(_) | Kind::Desk => (picture.still_samples, "rest".to_owned()),
-            Kind::Frame(_, frame) => (picture.samples, frame.to_string()),
+        let frame = match kind {
+            Kind::Desk => "rest".to_owned(),
+            Kind::Frame(_, frame) => frame.to_string(),
         };
+        self.picture_key(
+            subject,
+            if kind == Kind::Desk { "desk" } else { "frame" },
+            kind.light(),
+            &frame,
+        )
+    }
+
+    /// The key of a picture of this `kind`.
+    fn picture_key(&self, subject: &Subject, kind: &str, light: Preset, frame: &str) -> Key {
+        let picture = serde_json::to_string(&self.catalog.picture).unwrap_or_default();
         Key::new(
-            if kind == Kind::Desk { "desk" } else { "picture" },
+            kind,
             &[
                 ("fabric", &subject.fabric_hash),
                 ("clip", &subject.clip_hash),
-                ("frame", &frame),
-                ("light", kind.light().name()),
-                ("size", &format!("{:?}", picture.size)),
-                ("samples", &samples.to_string()),
-                ("depth", &picture.depth.to_string()),
-                ("seed", &picture.seed.to_string()),
-                ("denoise", &picture.denoise.to_string()),
+                ("frame", frame),
+                ("light", light.name()),
+                ("picture", &picture),
                 ("backend", self.photographer.identity()),
             ],
         )
+    }
+
+    /// The still of a fabric in a light, and the anchor of its frames.
+    fn still(&mut self, subject: &Subject, light: Preset) -> Result<Anchor> {
+        let id = &subject.spec.id;
+        let (name, anchor_name) = (
+            format!("{id}/{}-rest.png", light.name()),
+            format!("work/{id}/{}/anchor.bin", light.name()),
+        );
+        let key = self.picture_key(subject, "still", light, "rest");
+        let work = still_work(self.catalog);
+        if let (Some(_), Some(anchor)) = (
+            self.store.get(&name, &key),
+            self.store.get(&anchor_name, &key),
+        ) {
+            self.progress.skip(work);
+            return Anchor::from_bytes(&anchor);
+        }
+        self.check_stop()?;
+        self.progress
+            .say(&format!("{}: {}, at rest", subject.spec.name, light.name()));
+        let mut set = self.set_up(subject, light)?;
+        let picture = &self.catalog.picture;
+        let progress = &self.progress;
+        let taken = set.still(
+            &cloth::mesh(&subject.clip, None),
+            picture.samples_in(light),
+            picture.still_samples,
+            &mut |share| {
+                progress.show(share * work);
+                !progress.stopped()
+            },
+        );
+        let (film, anchor) = self.or_stopped(taken)?;
+        self.store.put(&anchor_name, &key, &anchor.to_bytes())?;
+        self.store.put(&name, &key, &film.png()?)?;
+        self.progress.add(work);
+        Ok(anchor)
     }
 
     /// The stage in a light, with the curtain at rest.
@@ -310,36 +436,56 @@ impl<'a> Run<'a> {
         let picture = &self.catalog.picture;
         let mut stage = Stage::new(light).with_curtain(cloth::mesh(&subject.clip, None));
         stage.set_material(optics::material(&subject.fabric)?);
-        let shoot = Shoot { size: picture.size, depth: picture.depth, seed: picture.seed, denoise: picture.denoise, layers: light == Preset::All };
+        let shoot = Shoot {
+            size: picture.size,
+            depth: picture.depth,
+            seed: picture.seed,
+            denoise: picture.denoise,
+            layers: light == Preset::All,
+        };
         self.photographer.set_up(&stage, &shoot)
     }
 
     /// Takes a picture: the bytes of its product.
-    fn take(&self, subject: &Subject, set: &mut Set, shot: &Shot) -> Result<Vec<u8>> {
+    fn take(
+        &self,
+        subject: &Subject,
+        set: &mut Set,
+        shot: &Shot,
+        anchor: Option<&Anchor>,
+    ) -> Result<Vec<u8>> {
         let picture = &self.catalog.picture;
         let name = &subject.spec.name;
         let (frame, samples) = match shot.kind {
-            Kind::Still(light) => {
-                self.progress.say(&format!("{name}: {}, at rest", light.name()));
-                (None, picture.still_samples)
-            }
             Kind::Desk => {
                 self.progress.say(&format!("{name}: one picture a light"));
-                (None, picture.still_samples)
+                (None, picture.desk_samples())
             }
             Kind::Frame(light, frame) => {
-                self.progress.say(&format!("{name}: {}, frame {} of {}", light.name(), frame + 1, self.catalog.motion.frames));
-                (Some(frame as usize), picture.samples)
+                self.progress.say(&format!(
+                    "{name}: {}, frame {} of {}",
+                    light.name(),
+                    frame + 1,
+                    self.catalog.motion.frames
+                ));
+                (Some(frame as usize), picture.samples_in(light))
             }
         };
         let progress = &self.progress;
-        let film = set.take(&cloth::mesh(&subject.clip, frame), samples, &mut |share| {
-            progress.show(share * shot.work);
-            !progress.stopped()
-        });
+        let film = set.take(
+            &cloth::mesh(&subject.clip, frame),
+            samples,
+            anchor,
+            &mut |share| {
+                progress.show(share * shot.work);
+                !progress.stopped()
+            },
+        );
         let film = self.or_stopped(film)?;
         if shot.kind == Kind::Desk {
-            return Ok(desk::script(&subject.spec.id, picture.size.into(), &film.lights()?)?.into_bytes());
+            return Ok(
+                desk::script(&subject.spec.id, picture.size.into(), &film.lights()?)?.into_bytes(),
+            );
         }
         film.png()
     }
@@ -348,32 +494,58 @@ impl<'a> Run<'a> {
     fn video(&mut self, subject: &Subject, light: Preset) -> Result<()> {
         let id = &subject.spec.id;
         let motion = &self.catalog.motion;
-        let frames: Vec<(String, Key)> = (0..motion.frames).map(|n| (frame_name(id, light, n), self.shot_key(subject, Kind::Frame(light, n)))).collect();
+        let frames: Vec<(String, Key)> = (0..motion.frames)
+            .map(|n| {
+                (
+                    frame_name(id, light, n),
+                    self.shot_key(subject, Kind::Frame(light, n)),
+                )
+            })
+            .collect();
         let all: Vec<&str> = frames.iter().map(|(_, key)| key.text()).collect();
-        let key = Key::new("video", &[("frames", &all.join(" ")), ("fps", &motion.fps.to_string())]);
-        let (name, poster) = (format!("{id}/{}.mp4", light.name()), format!("{id}/{}-poster.jpg", light.name()));
+        let key = Key::new(
+            "video",
+            &[("frames", &all.join(" ")), ("fps", &motion.fps.to_string())],
+        );
+        let (name, poster) = (
+            format!("{id}/{}.mp4", light.name()),
+            format!("{id}/{}-poster.jpg", light.name()),
+        );
         let work = video_work(self.catalog);
         if self.store.get(&name, &key).is_some() && self.store.get(&poster, &key).is_some() {
             self.progress.skip(work);
             return Ok(());
         }
         self.check_stop()?;
-        self.progress.say(&format!("{}: {}, video", subject.spec.name, light.name()));
+        self.progress
+            .say(&format!("{}: {}, video", subject.spec.name, light.name()));
         let read = |(name, key): &(String, Key)| -> Result<RgbImage> {
-            let bytes = self.store.get(name, key).with_context(|| format!("{name} vanished from the output folder while it was in use"))?;
-            Ok(image::load_from_memory(&bytes).with_context(|| format!("{name} is not a picture"))?.to_rgb8())
+            let bytes = self.store.get(name, key).with_context(|| {
+                format!("{name} vanished from the output folder while it was in use")
+            })?;
+            Ok(image::load_from_memory(&bytes)
+                .with_context(|| format!("{name} is not a picture"))?
+                .to_rgb8())
         };
         let bytes = video::encode(frames.iter().map(read), motion.fps)?;
         self.store.put(&name, &key, &bytes)?;
         let mut jpeg = Vec::new();
-        read(&frames[0])?.write_with_encoder(image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 88))?;
+        read(&frames[0])?.write_with_encoder(
+            image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 88),
+        )?;
         self.store.put(&poster, &key, &jpeg)?;
         self.progress.add(work);
         Ok(())
     }
 
     fn page(&self, subjects: &[Subject]) -> Result<PathBuf> {
-        let html = story::page(self.catalog, subjects, &self.order.command, self.photographer.why()).html();
+        let html = story::page(
+            self.catalog,
+            subjects,
+            &self.order.command,
+            self.photographer.why(),
+        )
+        .html();
         let key = Key::new("page", &[("html", &html)]);
         if self.store.get("index.html", &key).is_none() {
             self.store.put("index.html", &key, html.as_bytes())?;
@@ -385,7 +557,7 @@ impl<'a> Run<'a> {
 impl Kind {
     fn light(self) -> Preset {
         match self {
-            Self::Still(light) | Self::Frame(light, _) => light,
+            Self::Frame(light, _) => light,
             Self::Desk => Preset::All,
         }
     }
@@ -398,20 +570,24 @@ fn frame_name(id: &str, light: Preset, frame: u32) -> String {
 /// All pictures of a catalog in the order of work, numbered for the shards.
 fn shots(catalog: &Catalog) -> Vec<(usize, Shot)> {
     let picture = &catalog.picture;
-    let paths = f64::from(picture.size[0]) * f64::from(picture.size[1]) * PATH_WORK;
     let mut shots = Vec::new();
     for (subject, fabric) in catalog.fabrics.iter().enumerate() {
-        let still = f64::from(picture.still_samples) * paths;
-        for &light in &catalog.lights {
-            shots.push(Shot { subject, kind: Kind::Still(light), name: format!("{}/{}-rest.png", fabric.id, light.name()), work: still });
-        }
-        shots.push(Shot { subject, kind: Kind::Desk, name: format!("{}/lights.js", fabric.id), work: still });
+        shots.push(Shot {
+            subject,
+            kind: Kind::Desk,
+            name: format!("{}/lights.js", fabric.id),
+            work: work(catalog, picture.desk_samples()),
+        });
     }
     for (subject, fabric) in catalog.fabrics.iter().enumerate() {
         for &light in &catalog.lights {
             for n in 0..catalog.motion.frames {
-                let work = f64::from(picture.samples) * paths;
-                shots.push(Shot { subject, kind: Kind::Frame(light, n), name: frame_name(&fabric.id, light, n), work });
+                shots.push(Shot {
+                    subject,
+                    kind: Kind::Frame(light, n),
+                    name: frame_name(&fabric.id, light, n),
+                    work: work(catalog, picture.samples_in(light)),
+                });
             }
         }
     }
@@ -420,7 +596,19 @@ fn shots(catalog: &Catalog) -> Vec<(usize, Shot)> {
 
 /// Whether the picture of this number belongs to this run.
 fn mine(order: &Order, index: usize) -> bool {
-    order.shard.is_none_or(|(i, n)| index % n as usize == i as usize - 1)
+    order
+        .shard
+        .is_none_or(|(i, n)| index % n as usize == i as usize - 1)
+}
+
+/// Work of a picture with this many paths a pixel.
+fn work(catalog: &Catalog, samples: u32) -> f64 {
+    let size = catalog.picture.size;
+    f64::from(size[0] * size[1]) * (f64::from(samples) * PATH_WORK + FILTER_WORK)
+}
+
+fn still_work(catalog: &Catalog) -> f64 {
+    work(catalog, catalog.picture.still_samples)
 }
 
 fn clip_work(catalog: &Catalog) -> f64 {
@@ -430,5 +618,7 @@ fn clip_work(catalog: &Catalog) -> f64 {
 }
 
 fn video_work(catalog: &Catalog) -> f64 {
-    f64::from(catalog.motion.frames) * f64::from(catalog.picture.size[0] * catalog.picture.size[1]) * VIDEO_WORK
+    f64::from(catalog.motion.frames)
+        * f64::from(catalog.picture.size[0] * catalog.picture.size[1])
+        * VIDEO_WORK
 }

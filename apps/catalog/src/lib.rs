@@ -3,6 +3,7 @@
 //! [`catalog::Catalog`] says what is wanted, [`jobs::run`] does it: [`optics`] fits each fabric, [`cloth`] hangs it and lets it blow,
 //! [`stage::Stage`] is the lit room, [`picture`] renders it, [`video`] and [`mp4`] make the films, [`story`] and [`page`] the page.
 
+pub mod anchor;
 pub mod assets;
 pub mod catalog;
 pub mod cloth;

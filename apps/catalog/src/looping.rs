@@ -26,7 +26,11 @@ pub fn best_start(frames: &[Vec<Vec3>], count: usize, blend: usize) -> usize {
 
 /// Mean squared distance of the vertices of two frames [m²].
 fn apart(a: &[Vec3], b: &[Vec3]) -> f64 {
-    a.iter().zip(b).map(|(p, q)| f64::from(p.distance_squared(*q))).sum::<f64>() / a.len().max(1) as f64
+    a.iter()
+        .zip(b)
+        .map(|(p, q)| f64::from(p.distance_squared(*q)))
+        .sum::<f64>()
+        / a.len().max(1) as f64
 }
 
 /// `count` frames from `start` on; the first `blend` of them are mixed with what follows the last, so that the last leads to the
@@ -35,7 +39,9 @@ fn apart(a: &[Vec3], b: &[Vec3]) -> f64 {
 pub fn close(frames: &[Vec<Vec3>], start: usize, count: usize, blend: usize) -> Vec<Vec<Vec3>> {
     let mut out: Vec<Vec<Vec3>> = frames[start..(start + count).min(frames.len())].to_vec();
     for (i, frame) in out.iter_mut().enumerate().take(blend) {
-        let Some(after) = frames.get(start + count + i) else { break };
+        let Some(after) = frames.get(start + count + i) else {
+            break;
+        };
         let t = (i as f32 + 1.0) / (blend as f32 + 1.0);
         let share = t * t * (3.0 - 2.0 * t);
         for (p, q) in frame.iter_mut().zip(after) {
@@ -56,7 +62,10 @@ pub fn normals(positions: &[Vec3], indices: &[[u32; 3]]) -> Vec<Vec3> {
             normals[*i as usize] += area;
         }
     }
-    normals.into_iter().map(|n| n.try_normalize().unwrap_or(Vec3::Z)).collect()
+    normals
+        .into_iter()
+        .map(|n| n.try_normalize().unwrap_or(Vec3::Z))
+        .collect()
 }
 
 #[cfg(test)]
@@ -65,7 +74,15 @@ mod tests {
 
     /// One vertex on a circle, nine frames a turn, drifting slowly.
     fn turning(n: usize) -> Vec<Vec<Vec3>> {
-        (0..n).map(|i| vec![Vec3::new((i as f32 / 9.0 * std::f32::consts::TAU).cos(), (i as f32 / 9.0 * std::f32::consts::TAU).sin(), i as f32 * 0.01)]).collect()
+        (0..n)
+            .map(|i| {
+                vec![Vec3::new(
+                    (i as f32 / 9.0 * std::f32::consts::TAU).cos(),
+                    (i as f32 / 9.0 * std::f32::consts::TAU).sin(),
+                    i as f32 * 0.01,
+                )]
+            })
+            .collect()
     }
 
     #[test]
@@ -79,14 +96,20 @@ mod tests {
         for i in 0..count {
             let s = step(&out[i], &out[(i + 1) % count]);
             // Without the blend the last step would be 0.18 longer along z.
-            assert!((s - usual).abs() < 0.06 * usual + 0.01, "step {i}: {s} instead of {usual}");
+            assert!(
+                (s - usual).abs() < 0.06 * usual + 0.01,
+                "step {i}: {s} instead of {usual}"
+            );
         }
     }
 
     #[test]
     fn the_stretch_that_meets_itself_is_found() {
         // Only from frame 5 on does the motion repeat after 9 frames.
-        let mut frames: Vec<Vec<Vec3>> = turning(30).into_iter().map(|f| vec![Vec3::new(f[0].x, f[0].y, 0.0)]).collect();
+        let mut frames: Vec<Vec<Vec3>> = turning(30)
+            .into_iter()
+            .map(|f| vec![Vec3::new(f[0].x, f[0].y, 0.0)])
+            .collect();
         for (i, f) in frames.iter_mut().enumerate().take(5) {
             f[0].z = 1.0 + i as f32;
         }

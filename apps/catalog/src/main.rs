@@ -51,14 +51,18 @@ const EXAMPLES: &str = "Examples:
   woven-catalog --shard 2/4                  the second of four parts";
 
 fn size(text: &str) -> Result<[u32; 2], String> {
-    let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.trim().parse().ok()?, h.trim().parse().ok()?]));
+    let parts = text
+        .split_once(['x', 'X'])
+        .and_then(|(w, h)| Some([w.trim().parse().ok()?, h.trim().parse().ok()?]));
     let size: [u32; 2] = parts.ok_or("write width and height like 640x480")?;
     woven_catalog::video::check_size(size[0], size[1]).map_err(|e| e.to_string())?;
     Ok(size)
 }
 
 fn shard(text: &str) -> Result<(u32, u32), String> {
-    let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    let parts = text
+        .split_once('/')
+        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
     match parts {
         Some((i, n)) if 1 <= i && i <= n => Ok((i, n)),
         _ => Err("write the part and the number of parts like 2/4, counted from 1".to_owned()),
@@ -77,7 +81,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (mut catalog, folder) = match &arguments.catalog {
-        Some(path) => (Catalog::load(path)?, path.parent().map(PathBuf::from).unwrap_or_default()),
+        Some(path) => (
+            Catalog::load(path)?,
+            path.parent().map(PathBuf::from).unwrap_or_default(),
+        ),
         None => (Catalog::builtin()?, PathBuf::new()),
     };
     if arguments.quick {
@@ -106,14 +113,24 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
     })
     .context("Ctrl-C cannot be caught")?;
 
-    let order = Order { out: arguments.out.clone(), backend: arguments.backend, shard: arguments.shard, command: command() };
+    let order = Order {
+        out: arguments.out.clone(),
+        backend: arguments.backend,
+        shard: arguments.shard,
+        command: command(),
+    };
     match jobs::run(&catalog, &folder, &order, stop)? {
         Outcome::Complete { page } => println!("The catalog is ready: open {}", page.display()),
         Outcome::Partial { missing } => {
-            println!("This part is done; {missing} pictures of other parts are missing. The last part to finish makes the page, or run once more without --shard.");
+            println!(
+                "This part is done; {missing} pictures of other parts are missing. The last part to finish makes the page, or run once more without --shard."
+            );
         }
         Outcome::Stopped => {
-            eprintln!("woven-catalog: stopped on request. What is finished is kept in {}; start again with the same words to go on.", arguments.out.display());
+            eprintln!(
+                "woven-catalog: stopped on request. What is finished is kept in {}; start again with the same words to go on.",
+                arguments.out.display()
+            );
             return Ok(ExitCode::from(130));
         }
     }
@@ -122,6 +139,15 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
 
 /// The command as it was typed, without the folder of the program.
 fn command() -> String {
-    let words = std::env::args().skip(1).map(|w| if w.contains([' ', '"', '\'']) { format!("{w:?}") } else { w });
-    std::iter::once("woven-catalog".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+    let words = std::env::args().skip(1).map(|w| {
+        if w.contains([' ', '"', '\'']) {
+            format!("{w:?}")
+        } else {
+            w
+        }
+    });
+    std::iter::once("woven-catalog".to_owned())
+        .chain(words)
+        .collect::<Vec<_>>()
+        .join(" ")
 }

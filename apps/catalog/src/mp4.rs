@@ -37,16 +37,23 @@ const TICKS: u32 = 512;
 /// # Errors
 /// When the track is empty, has no usable parameter sets, or exceeds the 4 GiB that 32-bit offsets can name.
 pub fn write(track: &Track) -> Result<Vec<u8>> {
-    ensure!(!track.samples.is_empty(), "A video needs at least one frame; this one has none.");
+    ensure!(
+        !track.samples.is_empty(),
+        "A video needs at least one frame; this one has none."
+    );
     ensure!(track.fps > 0, "A video needs a frame rate above zero.");
-    ensure!(track.sps.len() >= 4 && !track.pps.is_empty(), "The H.264 encoder gave no parameter sets, so the video cannot be described.");
+    ensure!(
+        track.sps.len() >= 4 && !track.pps.is_empty(),
+        "The H.264 encoder gave no parameter sets, so the video cannot be described."
+    );
 
     let ftyp = ftyp();
     // `moov` names the place of the first sample, which depends on its own length but not on its own contents: measure, then write.
     let measured = moov(track, 0)?.len();
     let first = ftyp.len() + measured + 8;
     let payload: usize = track.samples.iter().map(|s| s.data.len()).sum();
-    let end = u32::try_from(first + payload).context("The video exceeds 4 GiB; use fewer or smaller frames.")?;
+    let end = u32::try_from(first + payload)
+        .context("The video exceeds 4 GiB; use fewer or smaller frames.")?;
 
     let mut out = Vec::with_capacity(end as usize);
     out.extend_from_slice(&ftyp);
@@ -113,59 +120,144 @@ fn identity(mut b: Boxed) -> Boxed {
 }
 
 fn ftyp() -> Vec<u8> {
-    Boxed::new(b"ftyp").bytes(b"isom").u32(512).bytes(b"isomiso2avc1mp41").end()
+    Boxed::new(b"ftyp")
+        .bytes(b"isom")
+        .u32(512)
+        .bytes(b"isomiso2avc1mp41")
+        .end()
 }
 
 fn moov(track: &Track, first: u32) -> Result<Vec<u8>> {
     let count = u32::try_from(track.samples.len())?;
-    let timescale = track.fps.checked_mul(TICKS).context("The frame rate is too high for a video.")?;
-    let duration = count.checked_mul(TICKS).context("The video has too many frames.")?;
+    let timescale = track
+        .fps
+        .checked_mul(TICKS)
+        .context("The frame rate is too high for a video.")?;
+    let duration = count
+        .checked_mul(TICKS)
+        .context("The video has too many frames.")?;
 
     // Times of creation are left at zero: the same frames give the same bytes.
-    let mvhd = Boxed::full(b"mvhd", 0, 0).u32(0).u32(0).u32(timescale).u32(duration);
+    let mvhd = Boxed::full(b"mvhd", 0, 0)
+        .u32(0)
+        .u32(0)
+        .u32(timescale)
+        .u32(duration);
     let mvhd = mvhd.u32(0x1_0000).u16(0x100).bytes(&[0; 10]); // rate 1, volume 1
     let mvhd = identity(mvhd).bytes(&[0; 24]).u32(2).end(); // next track id 2
 
-    let tkhd = Boxed::full(b"tkhd", 0, 3).u32(0).u32(0).u32(1).u32(0).u32(duration);
+    let tkhd = Boxed::full(b"tkhd", 0, 3)
+        .u32(0)
+        .u32(0)
+        .u32(1)
+        .u32(0)
+        .u32(duration);
     let tkhd = identity(tkhd.bytes(&[0; 16])); // layer, group, volume: none
-    let tkhd = tkhd.u32(u32::from(track.width) << 16).u32(u32::from(track.height) << 16).end();
+    let tkhd = tkhd
+        .u32(u32::from(track.width) << 16)
+        .u32(u32::from(track.height) << 16)
+        .end();
 
-    let mdhd = Boxed::full(b"mdhd", 0, 0).u32(0).u32(0).u32(timescale).u32(duration).u16(0x55c4).u16(0).end(); // "und"
-    let hdlr = Boxed::full(b"hdlr", 0, 0).u32(0).bytes(b"vide").bytes(&[0; 12]).bytes(b"VideoHandler\0").end();
+    let mdhd = Boxed::full(b"mdhd", 0, 0)
+        .u32(0)
+        .u32(0)
+        .u32(timescale)
+        .u32(duration)
+        .u16(0x55c4)
+        .u16(0)
+        .end(); // "und"
+    let hdlr = Boxed::full(b"hdlr", 0, 0)
+        .u32(0)
+        .bytes(b"vide")
+        .bytes(&[0; 12])
+        .bytes(b"VideoHandler\0")
+        .end();
     let vmhd = Boxed::full(b"vmhd", 0, 1).bytes(&[0; 8]).end();
     let url = Boxed::full(b"url ", 0, 1).end(); // the samples are in this file
     let dref = Boxed::full(b"dref", 0, 0).u32(1).bytes(&url).end();
     let dinf = Boxed::new(b"dinf").bytes(&dref).end();
 
-    let stbl = Boxed::new(b"stbl").bytes(&stsd(track)?).bytes(&timing(count)).bytes(&sync_table(track)).bytes(&places(track, first)?).end();
-    let minf = Boxed::new(b"minf").bytes(&vmhd).bytes(&dinf).bytes(&stbl).end();
-    let mdia = Boxed::new(b"mdia").bytes(&mdhd).bytes(&hdlr).bytes(&minf).end();
+    let stbl = Boxed::new(b"stbl")
+        .bytes(&stsd(track)?)
+        .bytes(&timing(count))
+        .bytes(&sync_table(track))
+        .bytes(&places(track, first)?)
+        .end();
+    let minf = Boxed::new(b"minf")
+        .bytes(&vmhd)
+        .bytes(&dinf)
+        .bytes(&stbl)
+        .end();
+    let mdia = Boxed::new(b"mdia")
+        .bytes(&mdhd)
+        .bytes(&hdlr)
+        .bytes(&minf)
+        .end();
     let trak = Boxed::new(b"trak").bytes(&tkhd).bytes(&mdia).end();
     Ok(Boxed::new(b"moov").bytes(&mvhd).bytes(&trak).end())
 }
 
 /// What the samples are: `avc1` with `avcC` (parameter sets), `colr` (Rec.709, limited range) and square pixels.
 fn stsd(track: &Track) -> Result<Vec<u8>> {
-    let sps_len = u16::try_from(track.sps.len()).context("The H.264 sequence parameter set is too long.")?;
-    let pps_len = u16::try_from(track.pps.len()).context("The H.264 picture parameter set is too long.")?;
+    let sps_len =
+        u16::try_from(track.sps.len()).context("The H.264 sequence parameter set is too long.")?;
+    let pps_len =
+        u16::try_from(track.pps.len()).context("The H.264 picture parameter set is too long.")?;
     let avcc = Boxed::new(b"avcC").u8(1).bytes(&track.sps[1..4]).u8(0xff); // profile, constraints, level; 4-byte lengths
-    let avcc = avcc.u8(0xe1).u16(sps_len).bytes(&track.sps).u8(1).u16(pps_len).bytes(&track.pps);
+    let avcc = avcc
+        .u8(0xe1)
+        .u16(sps_len)
+        .bytes(&track.sps)
+        .u8(1)
+        .u16(pps_len)
+        .bytes(&track.pps);
     // High profiles tell the chroma format and the bit depths too (14496-15, 5.3.3.1.2).
-    let avcc = if track.sps[1] >= 100 { avcc.bytes(&[0xfd, 0xf8, 0xf8, 0]) } else { avcc }.end();
-    let colr = Boxed::new(b"colr").bytes(b"nclx").u16(1).u16(1).u16(1).u8(0).end();
+    let avcc = if track.sps[1] >= 100 {
+        avcc.bytes(&[0xfd, 0xf8, 0xf8, 0])
+    } else {
+        avcc
+    }
+    .end();
+    let colr = Boxed::new(b"colr")
+        .bytes(b"nclx")
+        .u16(1)
+        .u16(1)
+        .u16(1)
+        .u8(0)
+        .end();
     let pasp = Boxed::new(b"pasp").u32(1).u32(1).end();
-    let avc1 = Boxed::new(b"avc1").bytes(&[0; 6]).u16(1).bytes(&[0; 16]).u16(track.width).u16(track.height);
-    let avc1 = avc1.u32(0x48_0000).u32(0x48_0000).u32(0).u16(1).bytes(&[0; 32]).u16(24).u16(0xffff); // 72 dpi, 24 bits
+    let avc1 = Boxed::new(b"avc1")
+        .bytes(&[0; 6])
+        .u16(1)
+        .bytes(&[0; 16])
+        .u16(track.width)
+        .u16(track.height);
+    let avc1 = avc1
+        .u32(0x48_0000)
+        .u32(0x48_0000)
+        .u32(0)
+        .u16(1)
+        .bytes(&[0; 32])
+        .u16(24)
+        .u16(0xffff); // 72 dpi, 24 bits
     let avc1 = avc1.bytes(&avcc).bytes(&colr).bytes(&pasp).end();
     Ok(Boxed::full(b"stsd", 0, 0).u32(1).bytes(&avc1).end())
 }
 
 fn timing(count: u32) -> Vec<u8> {
-    Boxed::full(b"stts", 0, 0).u32(1).u32(count).u32(TICKS).end()
+    Boxed::full(b"stts", 0, 0)
+        .u32(1)
+        .u32(count)
+        .u32(TICKS)
+        .end()
 }
 
 fn sync_table(track: &Track) -> Vec<u8> {
-    let numbers: Vec<u32> = (1..).zip(&track.samples).filter(|(_, s)| s.sync).map(|(n, _)| n).collect();
+    let numbers: Vec<u32> = (1..)
+        .zip(&track.samples)
+        .filter(|(_, s)| s.sync)
+        .map(|(n, _)| n)
+        .collect();
     let mut stss = Boxed::full(b"stss", 0, 0).u32(numbers.len() as u32);
     for n in numbers {
         stss = stss.u32(n);
@@ -180,7 +272,12 @@ fn places(track: &Track, first: u32) -> Result<Vec<u8>> {
     for sample in &track.samples {
         stsz = stsz.u32(u32::try_from(sample.data.len())?);
     }
-    let mut out = Boxed::full(b"stsc", 0, 0).u32(1).u32(1).u32(count).u32(1).end();
+    let mut out = Boxed::full(b"stsc", 0, 0)
+        .u32(1)
+        .u32(1)
+        .u32(count)
+        .u32(1)
+        .end();
     out.extend_from_slice(&stsz.end());
     out.extend_from_slice(&Boxed::full(b"stco", 0, 0).u32(1).u32(first).end());
     Ok(out)

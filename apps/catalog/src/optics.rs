@@ -11,7 +11,7 @@ use woven_fit::plot::Scale;
 use woven_fit::report;
 use woven_render::scene::{MAX_LINEAR, MAX_SHAPE, Material};
 
-use crate::catalog::FabricSpec;
+use crate::catalog::{FabricSpec, Fit};
 
 /// What is kept of a fit, beside the fabric file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -74,12 +74,38 @@ pub struct Fitted {
 ///
 /// # Errors
 /// A sentence when the file cannot be used, or on request.
-pub fn fit(path: &Path, spec: &FabricSpec, seed: u64, progress: &(dyn Fn(f64) -> bool + Sync)) -> Result<Fitted> {
-    let options = Options { seed, ..Options::default() };
-    let result = fit_measurement(path, &options, &|done, total, _| progress(done as f64 / total.max(1) as f64))
-        .with_context(|| format!("Fabric \"{}\" could not be fitted", spec.id))?;
-    let command = format!("woven-fit fit {} --seed {seed}", result.file);
-    let mut fabric = result.fabric(&command).with_context(|| format!("Fabric \"{}\": no sheet came out of the fit, so there is nothing to render", spec.id))?;
+pub fn fit(
+    path: &Path,
+    spec: &FabricSpec,
+    how: &Fit,
+    progress: &(dyn Fn(f64) -> bool + Sync),
+) -> Result<Fitted> {
+    let mut models = how.models.clone();
+    if !models.iter().any(|m| m == "sheet") {
+        models.push("sheet".to_owned());
+    }
+    let command = format!(
+        "woven-fit fit {} --model {} --seed {}",
+        path.file_name().unwrap_or_default().to_string_lossy(),
+        models.join(","),
+        how.seed
+    );
+    let options = Options {
+        models: Some(models),
+        starts: how.starts,
+        seed: how.seed,
+        ..Options::default()
+    };
+    let result = fit_measurement(path, &options, &|done, total, _| {
+        progress(done as f64 / total.max(1) as f64)
+    })
+    .with_context(|| format!("Fabric \"{}\" could not be fitted", spec.id))?;
+    let mut fabric = result.fabric(&command).with_context(|| {
+        format!(
+            "Fabric \"{}\": no sheet came out of the fit, so there is nothing to render",
+            spec.id
+        )
+    })?;
     fabric.name.clone_from(&spec.name);
     if !spec.maker.is_empty() {
         fabric.maker.clone_from(&spec.maker);
@@ -89,8 +115,14 @@ pub fn fit(path: &Path, spec: &FabricSpec, seed: u64, progress: &(dyn Fn(f64) ->
     }
     fabric.optics()?;
     let mut summary = summary(&result);
-    summary.notes.extend(fabric.provenance.get("remark").cloned());
-    Ok(Fitted { fabric, summary, report: report::html(&result, &command) })
+    summary
+        .notes
+        .extend(fabric.provenance.get("remark").cloned());
+    Ok(Fitted {
+        fabric,
+        summary,
+        report: report::html(&result, &command),
+    })
 }
 
 /// Colours every linear factor by `tint`, brought to luminance 1 so that the measured level stays, and paled until no channel of the
@@ -102,10 +134,17 @@ fn color(fabric: &mut Fabric, tint: [f64; 3]) {
     }
     let tint = tint.map(|c| c / luminance);
     let names = ["t_d", "k_t", "r_d", "k_r"];
-    let sum: f64 = names.iter().filter_map(|n| fabric.optics.parameters.get(*n)).sum();
+    let sum: f64 = names
+        .iter()
+        .filter_map(|n| fabric.optics.parameters.get(*n))
+        .sum();
     let most = tint.iter().copied().fold(0.0, f64::max);
     // 1 + s (most - 1) times the sum may not exceed 1.
-    let share = if most > 1.0 && sum > 0.0 { ((1.0 / sum - 1.0) / (most - 1.0)).clamp(0.0, 1.0) } else { 1.0 };
+    let share = if most > 1.0 && sum > 0.0 {
+        ((1.0 / sum - 1.0) / (most - 1.0)).clamp(0.0, 1.0)
+    } else {
+        1.0
+    };
     let color = tint.map(|c| 1.0 + share * (c - 1.0));
     for name in names {
         if fabric.optics.parameters.contains_key(name) {
@@ -116,8 +155,18 @@ fn color(fabric: &mut Fabric, tint: [f64; 3]) {
 
 fn summary(result: &FitResult) -> Summary {
     let sheet = result.ranking.iter().find(|f| f.label == "sheet");
-    let parameters = sheet.into_iter().chain(&result.reflection).flat_map(rows).collect();
-    let ranked = |f: &ModelFit| Ranked { place: f.place, label: f.label.clone(), rms_e4: f.rms_e4, cross_e4: f.cross_validation_e4, aicc: f.aicc };
+    let parameters = sheet
+        .into_iter()
+        .chain(&result.reflection)
+        .flat_map(rows)
+        .collect();
+    let ranked = |f: &ModelFit| Ranked {
+        place: f.place,
+        label: f.label.clone(),
+        rms_e4: f.rms_e4,
+        cross_e4: f.cross_validation_e4,
+        aicc: f.aicc,
+    };
     let straight = result.straight.as_ref();
     Summary {
         name: result.name.clone(),
@@ -137,12 +186,22 @@ fn plots(result: &FitResult) -> Vec<(String, String)> {
     if points.incidences.len() > 1 {
         plots.push(("The same at 40°".to_owned(), polar_plot(result, 40.0, 0.0)));
     }
-    let sheet: Vec<&ModelFit> = result.ranking.iter().filter(|f| f.label == "sheet").collect();
+    let sheet: Vec<&ModelFit> = result
+        .ranking
+        .iter()
+        .filter(|f| f.label == "sheet")
+        .collect();
     if let (Some(slice), false) = (slices(points).first(), sheet.is_empty()) {
-        plots.push(("Transmission at normal incidence on a logarithmic scale".to_owned(), slice_chart(points, slice, &sheet, Scale::Log)));
+        plots.push((
+            "Transmission at normal incidence on a logarithmic scale".to_owned(),
+            slice_chart(points, slice, &sheet, Scale::Log),
+        ));
     }
     if let Some(fit) = sheet.iter().find(|f| f.has_gap) {
-        plots.push(("Light that passes straight through, over the angle of incidence".to_owned(), gap_chart(points, fit)));
+        plots.push((
+            "Light that passes straight through, over the angle of incidence".to_owned(),
+            gap_chart(points, fit),
+        ));
     }
     plots
 }
@@ -151,8 +210,15 @@ fn plots(result: &FitResult) -> Vec<(String, String)> {
 fn rows(fit: &ModelFit) -> impl Iterator<Item = Parameter> + '_ {
     let model = woven_bsdf::model::find(fit.model);
     fit.parameters.iter().map(move |p| {
-        let meaning = model.and_then(|m| m.params.iter().find(|q| q.name == p.name)).map_or("", |q| q.meaning);
-        Parameter { name: p.name.to_owned(), meaning: meaning.to_owned(), value: p.value, error: p.standard_error }
+        let meaning = model
+            .and_then(|m| m.params.iter().find(|q| q.name == p.name))
+            .map_or("", |q| q.meaning);
+        Parameter {
+            name: p.name.to_owned(),
+            meaning: meaning.to_owned(),
+            value: p.value,
+            error: p.standard_error,
+        }
     })
 }
 
@@ -162,9 +228,19 @@ fn rows(fit: &ModelFit) -> impl Iterator<Item = Parameter> + '_ {
 /// When the fabric's model is not the sheet, or a parameter is out of its range.
 pub fn material(fabric: &Fabric) -> Result<Material> {
     let optics = fabric.optics()?;
-    anyhow::ensure!(optics.model.name == "sheet", "The fabric \"{}\" has the model {}; only the sheet can be rendered.", fabric.name, optics.model.name);
+    anyhow::ensure!(
+        optics.model.name == "sheet",
+        "The fabric \"{}\" has the model {}; only the sheet can be rendered.",
+        fabric.name,
+        optics.model.name
+    );
     let mut material = Material::matt(&fabric.name, [0.0; 3]);
-    for (to, from) in material.linear.iter_mut().zip(&optics.linear).take(MAX_LINEAR) {
+    for (to, from) in material
+        .linear
+        .iter_mut()
+        .zip(&optics.linear)
+        .take(MAX_LINEAR)
+    {
         *to = from.map(|c| c as f32);
     }
     for (to, from) in material.shape.iter_mut().zip(&optics.shape).take(MAX_SHAPE) {

@@ -107,19 +107,30 @@ impl Page {
             escape(&self.lead)
         );
         for f in &self.fabrics {
-            let _ = write!(out, "<a href=\"#{}\">{}</a>", escape(&f.id), escape(&f.name));
+            let _ = write!(
+                out,
+                "<a href=\"#{}\">{}</a>",
+                escape(&f.id),
+                escape(&f.name)
+            );
         }
         out.push_str("</nav>\n</header>\n<main>\n");
         for f in &self.fabrics {
             f.html(&mut out);
         }
-        out.push_str("</main>\n<footer>\n<details open><summary>How this page was made</summary>\n");
+        out.push_str(
+            "</main>\n<footer>\n<details open><summary>How this page was made</summary>\n",
+        );
         list(&mut out, &self.made);
         out.push_str("</details>\n</footer>\n");
         for desk in self.fabrics.iter().filter_map(|f| f.desk.as_ref()) {
             let _ = writeln!(out, "<script src=\"{}\"></script>", escape(&desk.script));
         }
-        let _ = write!(out, "<script>\n{}</script>\n</body>\n</html>\n", include_str!("page/page.js"));
+        let _ = write!(
+            out,
+            "<script>\n{}</script>\n</body>\n</html>\n",
+            include_str!("page/page.js")
+        );
         out
     }
 }
@@ -127,8 +138,15 @@ impl Page {
 impl FabricPart {
     fn html(&self, out: &mut String) {
         let (id, name) = (escape(&self.id), escape(&self.name));
-        let _ = writeln!(out, "<section class=\"fabric\" id=\"{id}\" aria-labelledby=\"{id}-name\">");
-        let _ = writeln!(out, "<div class=\"name\"><h2 id=\"{id}-name\">{name}</h2><p>{}</p></div>", escape(&self.facts));
+        let _ = writeln!(
+            out,
+            "<section class=\"fabric\" id=\"{id}\" aria-labelledby=\"{id}-name\">"
+        );
+        let _ = writeln!(
+            out,
+            "<div class=\"name\"><h2 id=\"{id}-name\">{name}</h2><p>{}</p></div>",
+            escape(&self.facts)
+        );
         let _ = writeln!(out, "<p class=\"lead\">{}</p>", escape(&self.lead));
         for pair in self.shots.chunks(2) {
             out.push_str("<div class=\"pair\">\n");
@@ -144,15 +162,27 @@ impl FabricPart {
         for (caption, svg) in &self.plots {
             // An SVG of ours goes in as it is; a declaration before it would not be HTML.
             let svg = svg.find("<svg").map_or("", |at| &svg[at..]);
-            let _ = writeln!(out, "<figure class=\"plot\">{svg}<figcaption>{}</figcaption></figure>", escape(caption));
+            let _ = writeln!(
+                out,
+                "<figure class=\"plot\">{svg}<figcaption>{}</figcaption></figure>",
+                escape(caption)
+            );
         }
         if let Some(report) = &self.report {
-            let _ = writeln!(out, "<p><a href=\"{}\">The whole report of the fit</a></p>", escape(report));
+            let _ = writeln!(
+                out,
+                "<p><a href=\"{}\">The whole report of the fit</a></p>",
+                escape(report)
+            );
         }
         out.push_str("</div>\n<div>\n<h3>The fitted sheet</h3>\n<div class=\"scroll\"><table>\n<thead><tr><th>Parameter</th><th class=\"n\">Value</th><th class=\"n\">± standard error</th></tr></thead>\n<tbody>\n");
         for row in &self.parameters {
             let (value, error) = plus_minus(row.value, row.error);
-            let unit = if row.unit.is_empty() { String::new() } else { format!(" {}", escape(&row.unit)) };
+            let unit = if row.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {}", escape(&row.unit))
+            };
             let _ = writeln!(
                 out,
                 "<tr><td><code>{}</code><small>{}</small></td><td class=\"n\">{value}{unit}</td><td class=\"n\">{error}</td></tr>",
@@ -167,13 +197,23 @@ impl FabricPart {
         if let Some((head, rows)) = &self.ranking {
             out.push_str("<details><summary>Ranking of the models</summary>\n<div class=\"scroll\"><table>\n<thead><tr>");
             for (i, h) in head.iter().enumerate() {
-                let _ = write!(out, "<th{}>{}</th>", if i == 0 { "" } else { " class=\"n\"" }, escape(h));
+                let _ = write!(
+                    out,
+                    "<th{}>{}</th>",
+                    if i == 0 { "" } else { " class=\"n\"" },
+                    escape(h)
+                );
             }
             out.push_str("</tr></thead>\n<tbody>\n");
             for row in rows {
                 out.push_str("<tr>");
                 for (i, cell) in row.iter().enumerate() {
-                    let _ = write!(out, "<td{}>{}</td>", if i == 0 { "" } else { " class=\"n\"" }, escape(cell));
+                    let _ = write!(
+                        out,
+                        "<td{}>{}</td>",
+                        if i == 0 { "" } else { " class=\"n\"" },
+                        escape(cell)
+                    );
                 }
                 out.push_str("</tr>\n");
             }
@@ -195,9 +235,17 @@ impl Shot {
                 "<video src=\"{file}\" poster=\"{}\" width=\"{w}\" height=\"{h}\" aria-label=\"{alt}\" autoplay muted loop playsinline controls preload=\"metadata\"></video>",
                 escape(poster)
             ),
-            None => write!(out, "<img class=\"still\" src=\"{file}\" alt=\"{alt}\" width=\"{w}\" height=\"{h}\" loading=\"lazy\">"),
+            None => write!(
+                out,
+                "<img class=\"still\" src=\"{file}\" alt=\"{alt}\" width=\"{w}\" height=\"{h}\" loading=\"lazy\">"
+            ),
         };
-        let _ = writeln!(out, "<figcaption><b>{}</b><span>{}</span></figcaption></figure>", escape(&self.title), escape(&self.detail));
+        let _ = writeln!(
+            out,
+            "<figcaption><b>{}</b><span>{}</span></figcaption></figure>",
+            escape(&self.title),
+            escape(&self.detail)
+        );
     }
 }
 
@@ -222,8 +270,16 @@ impl Desk {
         }
         out.push_str("<label>Exposure<input type=\"range\" name=\"exposure\" min=\"-3\" max=\"3\" step=\"0.1\" value=\"0\" data-unit=\"EV\"><output>0 EV</output></label>\n<div class=\"presets\">");
         for (label, shares) in &self.presets {
-            let json: Vec<String> = shares.iter().map(|(name, share)| format!("\"{name}\":{share}")).collect();
-            let _ = write!(out, "<button type=\"button\" data-preset=\"{}\">{}</button>", escape(&format!("{{{}}}", json.join(","))), escape(label));
+            let json: Vec<String> = shares
+                .iter()
+                .map(|(name, share)| format!("\"{name}\":{share}"))
+                .collect();
+            let _ = write!(
+                out,
+                "<button type=\"button\" data-preset=\"{}\">{}</button>",
+                escape(&format!("{{{}}}", json.join(","))),
+                escape(label)
+            );
         }
         out.push_str("</div>\n</div>\n</div>\n");
     }
@@ -262,7 +318,11 @@ pub fn plus_minus(value: f64, error: Option<f64>) -> (String, String) {
             (format!("{value:.places$}"), format!("{error:.places$}"))
         }
         None => {
-            let places = if value == 0.0 { 1.0 } else { (3.0 - value.abs().log10().floor()).clamp(0.0, 9.0) };
+            let places = if value == 0.0 {
+                1.0
+            } else {
+                (3.0 - value.abs().log10().floor()).clamp(0.0, 9.0)
+            };
             (format!("{value:.0$}", places as usize), "–".to_owned())
         }
     }
@@ -274,22 +334,42 @@ mod tests {
 
     #[test]
     fn digits_follow_the_error() {
-        assert_eq!(plus_minus(0.123_456, Some(0.0021)), ("0.1235".into(), "0.0021".into()));
-        assert_eq!(plus_minus(12.345, Some(1.26)), ("12.3".into(), "1.3".into()));
+        assert_eq!(
+            plus_minus(0.123_456, Some(0.0021)),
+            ("0.1235".into(), "0.0021".into())
+        );
+        assert_eq!(
+            plus_minus(12.345, Some(1.26)),
+            ("12.3".into(), "1.3".into())
+        );
         assert_eq!(plus_minus(0.049_35, None), ("0.04935".into(), "–".into()));
         assert_eq!(plus_minus(1.0, Some(f64::NAN)).1, "–");
     }
 
     #[test]
     fn names_from_files_cannot_break_out() {
-        let part = FabricPart { id: "a".into(), name: "<script>alert(1)</script> & \"co\"".into(), ..FabricPart::default() };
-        let html = Page { title: "T".into(), fabrics: vec![part], ..Page::default() }.html();
-        assert!(!html.contains("<script>alert") && html.contains("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;co&quot;"));
+        let part = FabricPart {
+            id: "a".into(),
+            name: "<script>alert(1)</script> & \"co\"".into(),
+            ..FabricPart::default()
+        };
+        let html = Page {
+            title: "T".into(),
+            fabrics: vec![part],
+            ..Page::default()
+        }
+        .html();
+        assert!(
+            !html.contains("<script>alert")
+                && html.contains("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;co&quot;")
+        );
     }
 
     #[test]
     fn nothing_is_fetched_from_the_network() {
         let html = Page::default().html();
-        assert!(!html.contains("http://") && !html.contains("https://") && !html.contains("@import"));
+        assert!(
+            !html.contains("http://") && !html.contains("https://") && !html.contains("@import")
+        );
     }
 }

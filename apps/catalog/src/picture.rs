@@ -5,9 +5,11 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context as _, Result, ensure};
 use clap::ValueEnum;
 use image::{ExtendedColorType, ImageEncoder as _};
+use woven_render::denoise::{Settings as Filter, denoise};
 use woven_render::film::{Curve, Film};
 use woven_render::render::{Backend, Renderer, Settings};
 
+use crate::anchor::Anchor;
 use crate::desk::Layer;
 use crate::stage::{CurtainMesh, Preset, Stage};
 
@@ -68,7 +70,12 @@ impl Photographer {
     /// # Errors
     /// When a graphics card was asked for and there is none.
     pub fn choose(choice: Choice) -> Result<Self> {
-        let settings = Settings { width: TRIAL, height: TRIAL, spp: 1, ..Settings::default() };
+        let settings = Settings {
+            width: TRIAL,
+            height: TRIAL,
+            spp: 1,
+            ..Settings::default()
+        };
         let wanted = match choice {
             Choice::Auto => Backend::Auto,
             Choice::Cpu => Backend::Cpu,
@@ -79,12 +86,28 @@ impl Photographer {
         if let Some(note) = trial.note() {
             // Nothing but the fall back to the processor leaves a note before the first sample.
             let note = note.strip_prefix("rendering on the CPU: ").unwrap_or(note);
-            return Ok(Self { backend: Backend::Cpu, why: format!("Rendered on the CPU: {note}."), identity: "cpu".to_owned() });
+            return Ok(Self {
+                backend: Backend::Cpu,
+                why: format!("Rendered on the CPU: {note}."),
+                identity: "cpu".to_owned(),
+            });
         }
         Ok(match (choice, device.starts_with("CPU")) {
-            (Choice::Cpu, _) => Self { backend: Backend::Cpu, why: "Rendered on the CPU, as asked.".to_owned(), identity: "cpu".to_owned() },
-            (_, true) => Self { backend: Backend::Cpu, why: "Rendered on the CPU.".to_owned(), identity: "cpu".to_owned() },
-            (_, false) => Self { backend: Backend::Gpu, why: format!("Rendered on the GPU: {device}."), identity: format!("gpu {device}") },
+            (Choice::Cpu, _) => Self {
+                backend: Backend::Cpu,
+                why: "Rendered on the CPU, as asked.".to_owned(),
+                identity: "cpu".to_owned(),
+            },
+            (_, true) => Self {
+                backend: Backend::Cpu,
+                why: "Rendered on the CPU.".to_owned(),
+                identity: "cpu".to_owned(),
+            },
+            (_, false) => Self {
+                backend: Backend::Gpu,
+                why: format!("Rendered on the GPU: {device}."),
+                identity: format!("gpu {device}"),
+            },
         })
     }
 
@@ -112,40 +135,110 @@ impl Photographer {
             depth: shoot.depth,
             seed: (shoot.seed ^ (shoot.seed >> 32)) as u32,
             light_layers: shoot.layers,
-            aov: shoot.denoise,
+            aov: true,
             ..Settings::default()
         };
         let renderer = Renderer::new(stage.scene(), &settings, self.backend)?;
-        Ok(Set { renderer, curtain: stage.curtain(), exposure: stage.scene().camera.exposure, denoise: shoot.denoise })
+        Ok(Set {
+            renderer,
+            curtain: stage.curtain(),
+            exposure: stage.scene().camera.exposure,
+            denoise: shoot.denoise,
+        })
     }
 }
 
 impl Set {
-    /// Takes a picture with the curtain as `mesh` has it, `samples` paths a pixel. `progress(share)` answers false to stop.
+    /// Takes a picture with the curtain as `mesh` has it, `samples` paths a pixel, steadied by an anchor of [`Self::still`] with as
+    /// many `few` samples. `progress(share)` answers false to stop.
     ///
     /// The picture does not depend on the ones taken before: the ray structure is fitted to the new places from the same start.
     ///
     /// # Errors
     /// When the backend fails, or on request.
-    pub fn take(&mut self, mesh: &CurtainMesh, samples: u32, progress: &mut dyn FnMut(f64) -> bool) -> Result<Picture> {
-        self.renderer.move_mesh(self.curtain, &mesh.positions, &mesh.normals)?;
+    pub fn take(
+        &mut self,
+        mesh: &CurtainMesh,
+        samples: u32,
+        anchor: Option<&Anchor>,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Picture> {
+        self.renderer
+            .move_mesh(self.curtain, &mesh.positions, &mesh.normals)?;
+        self.gather(samples, samples, progress)?;
+        let mut film = self.renderer.film()?;
+        if let Some(anchor) = anchor {
+            anchor.steady(&mut film);
+        }
+        Ok(self.develop(film))
+    }
+
+    /// Takes a picture with `many` paths a pixel, and the anchor for frames with `few`.
+    ///
+    /// # Errors
+    /// As [`Self::take`].
+    pub fn still(
+        &mut self,
+        mesh: &CurtainMesh,
+        few: u32,
+        many: u32,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<(Picture, Anchor)> {
+        self.renderer
+            .move_mesh(self.curtain, &mesh.positions, &mesh.normals)?;
+        self.gather(few, many, progress)?;
+        let begun = self.renderer.film()?;
+        self.gather(many.max(few), many, progress)?;
+        let film = self.renderer.film()?;
+        let anchor = Anchor::new(&begun, &film);
+        Ok((self.develop(film), anchor))
+    }
+
+    /// Goes on until there are `samples` paths a pixel, of `all` that will be.
+    fn gather(
+        &mut self,
+        samples: u32,
+        all: u32,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<()> {
         let go_on = AtomicBool::new(false);
         while self.renderer.samples() < samples {
             let left = samples - self.renderer.samples();
-            ensure!(self.renderer.step(left.min(STEP), &go_on)?, "The renderer stopped before the picture was done.");
-            ensure!(progress(f64::from(self.renderer.samples()) / f64::from(samples)), "Stopped on request.");
+            ensure!(
+                self.renderer.step(left.min(STEP), &go_on)?,
+                "The renderer stopped before the picture was done."
+            );
+            ensure!(
+                progress(f64::from(self.renderer.samples()) / f64::from(all.max(1))),
+                "Stopped on request."
+            );
         }
-        let film = self.renderer.film()?;
-        Ok(Picture { film: if self.denoise { denoised(film)? } else { film }, exposure: self.exposure })
+        Ok(())
+    }
+
+    fn develop(&self, mut film: Film) -> Picture {
+        if self.denoise {
+            denoise(&mut film, &FILTER);
+        }
+        Picture {
+            film,
+            exposure: self.exposure,
+        }
     }
 }
 
+/// A smaller window than the filter's own: a still is 480 pixels wide, and there are hundreds of frames.
+const FILTER: Filter = Filter {
+    radius: 6,
+    strength: 0.6,
+    albedo: 0.06,
+    normal: 0.25,
+    depth: 0.02,
+    gap: 0.06,
+};
+
 /// Paths a pixel between two looks at the wish to stop: well under a second.
 const STEP: u32 = 4;
-
-fn denoised(film: Film) -> Result<Film> {
-    Ok(film)
-}
 
 impl Picture {
     /// The picture as a PNG, exposed and bent for the screen.
@@ -156,7 +249,12 @@ impl Picture {
         let (width, height) = (self.film.width as u32, self.film.height as u32);
         let mut png = Vec::new();
         image::codecs::png::PngEncoder::new(&mut png)
-            .write_image(&self.film.to_rgb8(Curve::Filmic, self.exposure), width, height, ExtendedColorType::Rgb8)
+            .write_image(
+                &self.film.to_rgb8(Curve::Filmic, self.exposure),
+                width,
+                height,
+                ExtendedColorType::Rgb8,
+            )
             .context("The picture could not be stored as PNG")?;
         Ok(png)
     }
@@ -169,7 +267,9 @@ impl Picture {
         ["sun", "sky", "lamps"]
             .into_iter()
             .map(|name| {
-                let pixels = self.film.layer(&format!("light.{name}")).with_context(|| format!("The renderer left no layer for the light \"{name}\""))?;
+                let pixels = self.film.layer(&format!("light.{name}")).with_context(|| {
+                    format!("The renderer left no layer for the light \"{name}\"")
+                })?;
                 Ok(Layer { name, pixels })
             })
             .collect()

@@ -25,13 +25,26 @@ impl Progress {
     /// A bar over `total` work. `stop` is raised when the user wants to stop.
     #[must_use]
     pub fn new(total: f64, stop: Arc<AtomicBool>) -> Self {
-        let target = if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target = if std::io::stderr().is_terminal() {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
         let bar = ProgressBar::with_draw_target(Some(STEPS), target);
         // The template is a constant that indicatif accepts; the fallback is its own.
-        let style = ProgressStyle::with_template("{bar:28} {percent:>3} %  {elapsed} gone, {prefix} left  {wide_msg}");
+        let style = ProgressStyle::with_template(
+            "{bar:28} {percent:>3} %  {elapsed} gone, {prefix} left  {wide_msg}",
+        );
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_prefix("?");
-        Self { bar, total: total.max(f64::MIN_POSITIVE), done: 0.0, fresh: 0.0, since: Instant::now(), stop }
+        Self {
+            bar,
+            total: total.max(f64::MIN_POSITIVE),
+            done: 0.0,
+            fresh: 0.0,
+            since: Instant::now(),
+            stop,
+        }
     }
 
     /// Says what is being done now.
@@ -54,7 +67,9 @@ impl Progress {
 
     /// Shows that `work` of the present piece is done, without counting it yet.
     pub fn show(&self, work: f64) {
-        self.bar.set_position(((self.done + work) / self.total * STEPS as f64).clamp(0.0, STEPS as f64) as u64);
+        self.bar.set_position(
+            ((self.done + work) / self.total * STEPS as f64).clamp(0.0, STEPS as f64) as u64,
+        );
         if let Some(left) = self.left(work) {
             self.bar.set_prefix(human(left));
         }
@@ -63,12 +78,20 @@ impl Progress {
     /// Time left at the rate of this run.
     fn left(&self, work: f64) -> Option<Duration> {
         let (fresh, gone) = (self.fresh + work, self.since.elapsed().as_secs_f64());
-        (fresh > 0.0 && gone > 2.0).then(|| Duration::from_secs_f64(((self.total - self.done - work).max(0.0) * gone / fresh).min(1e7)))
+        (fresh > 0.0 && gone > 2.0).then(|| {
+            Duration::from_secs_f64(
+                ((self.total - self.done - work).max(0.0) * gone / fresh).min(1e7),
+            )
+        })
     }
 
     /// Writes a line above the bar; on stderr when there is no bar.
     pub fn line(&self, text: &str) {
-        if self.bar.is_hidden() { eprintln!("{text}") } else { self.bar.println(text) }
+        if self.bar.is_hidden() {
+            eprintln!("{text}")
+        } else {
+            self.bar.println(text)
+        }
     }
 
     /// True when the user wants to stop.

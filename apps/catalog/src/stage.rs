@@ -18,7 +18,7 @@ mod texture;
 use glam::{Vec2, Vec3};
 use woven_render::scene::{Camera, LAYER_LAMPS, Material, Mesh, Scene, Texture, TextureUse};
 
-pub use light::{DUSK, Preset, sun_direction};
+pub use light::{DUSK, LAMP_BOOST, Preset, sun_direction};
 pub use room::{OPENING, RAIL_DISTANCE, RAIL_HEIGHT, ROOM, WALL, portal};
 
 /// Left and right end of the closed curtain on the rail [m].
@@ -57,14 +57,28 @@ impl Stage {
         outside::build(&mut builder);
         let mut scene = builder.scene;
         let cloth = scene.materials.len();
-        scene.materials.push(Material::diffuse_sheet("curtain", [0.45; 3], [0.35; 3], 0.02));
+        scene.materials.push(Material::diffuse_sheet(
+            "curtain", [0.45; 3], [0.35; 3], 0.02,
+        ));
         let curtain = scene.meshes.len();
-        scene.meshes.push(Mesh { name: "curtain".to_owned(), material: cloth, moving: true, ..Mesh::default() });
+        scene.meshes.push(Mesh {
+            name: "curtain".to_owned(),
+            material: cloth,
+            moving: true,
+            ..Mesh::default()
+        });
         scene.lights.extend(preset.sun());
         scene.environment = Some(preset.sky());
         scene.portals.push(room::portal());
-        scene.camera = Camera { exposure: preset.exposure(), ..camera() };
-        Self { scene, curtain, cloth }
+        scene.camera = Camera {
+            exposure: preset.exposure(),
+            ..camera()
+        };
+        Self {
+            scene,
+            curtain,
+            cloth,
+        }
     }
 
     /// Hangs a curtain on the rail, in the place of the one that hung there.
@@ -77,13 +91,22 @@ impl Stage {
     /// Hangs a curtain on the rail, in the place of the one that hung there.
     pub fn set_curtain(&mut self, mesh: CurtainMesh) {
         let place = &mut self.scene.meshes[self.curtain];
-        let CurtainMesh { positions, normals, uvs, indices } = mesh;
-        (place.positions, place.normals, place.uvs, place.indices) = (positions, normals, uvs, indices);
+        let CurtainMesh {
+            positions,
+            normals,
+            uvs,
+            indices,
+        } = mesh;
+        (place.positions, place.normals, place.uvs, place.indices) =
+            (positions, normals, uvs, indices);
     }
 
     /// Weaves the curtain of another material; its name stays "curtain".
     pub fn set_material(&mut self, material: Material) {
-        self.scene.materials[self.cloth] = Material { name: "curtain".to_owned(), ..material };
+        self.scene.materials[self.cloth] = Material {
+            name: "curtain".to_owned(),
+            ..material
+        };
     }
 
     /// The scene to render.
@@ -112,7 +135,12 @@ impl Stage {
 
 /// The eye: standing in the room, a little to the right, looking at the curtain.
 fn camera() -> Camera {
-    Camera::look_at(Vec3::new(0.42, 1.34, 4.35), Vec3::new(-0.02, 1.20, 0.0), Vec3::Y, 36_f32.to_radians())
+    Camera::look_at(
+        Vec3::new(0.42, 1.34, 4.35),
+        Vec3::new(-0.02, 1.20, 0.0),
+        Vec3::Y,
+        36_f32.to_radians(),
+    )
 }
 
 /// A scene being put together.
@@ -141,11 +169,18 @@ impl Builder {
     }
 
     fn textured(&mut self, name: &str, tint: [f32; 3], texture: TextureUse) -> usize {
-        self.material(Material { color_texture: Some(texture), ..Material::matt(name, tint) })
+        self.material(Material {
+            color_texture: Some(texture),
+            ..Material::matt(name, tint)
+        })
     }
 
     fn lamp(&mut self, name: &str, radiance: [f32; 3], albedo: [f32; 3]) -> usize {
-        let shade = Material { emission: radiance, double_sided: true, layer: LAYER_LAMPS, ..Material::matt(name, albedo) };
+        let shade = Material {
+            emission: radiance,
+            layer: LAYER_LAMPS,
+            ..Material::matt(name, albedo)
+        };
         self.material(shade)
     }
 
@@ -168,8 +203,22 @@ mod tests {
                 assert!(mesh.material < scene.materials.len(), "{}", mesh.name);
                 assert_eq!(mesh.normals.len(), mesh.positions.len(), "{}", mesh.name);
                 assert_eq!(mesh.uvs.len(), mesh.positions.len(), "{}", mesh.name);
-                assert!(mesh.indices.iter().flatten().all(|&i| (i as usize) < mesh.positions.len()), "{}", mesh.name);
-                assert!(mesh.positions.iter().chain(&mesh.normals).all(|p| p.is_finite()), "{}", mesh.name);
+                assert!(
+                    mesh.indices
+                        .iter()
+                        .flatten()
+                        .all(|&i| (i as usize) < mesh.positions.len()),
+                    "{}",
+                    mesh.name
+                );
+                assert!(
+                    mesh.positions
+                        .iter()
+                        .chain(&mesh.normals)
+                        .all(|p| p.is_finite()),
+                    "{}",
+                    mesh.name
+                );
             }
         }
     }
@@ -180,12 +229,21 @@ mod tests {
         assert!(eye.cmpgt(ROOM.0).all() && eye.cmplt(ROOM.1).all());
         assert!(sun_direction().z < 0.0 && sun_direction().y > 0.0);
         let portal = portal();
-        assert!(portal.edge_u.cross(portal.edge_v).z > 0.0, "the portal's normal points into the room");
+        assert!(
+            portal.edge_u.cross(portal.edge_v).z > 0.0,
+            "the portal's normal points into the room"
+        );
     }
 
     #[test]
     fn lamps_are_off_by_day_and_the_sun_is_down_in_the_evening() {
-        let lit = |preset| Stage::new(preset).scene.materials.iter().any(|m| m.emission != [0.0; 3]);
+        let lit = |preset| {
+            Stage::new(preset)
+                .scene
+                .materials
+                .iter()
+                .any(|m| m.emission != [0.0; 3])
+        };
         assert!(!lit(Preset::Day) && lit(Preset::Evening) && lit(Preset::All));
         assert!(Stage::new(Preset::Evening).scene.lights.is_empty());
     }

@@ -22,7 +22,10 @@ impl Key {
     #[must_use]
     pub fn new(kind: &str, inputs: &[(&str, &str)]) -> Self {
         let mut hash = Sha256::new();
-        for (name, value) in [("kind", kind), ("version", version())].iter().chain(inputs) {
+        for (name, value) in [("kind", kind), ("version", version())]
+            .iter()
+            .chain(inputs)
+        {
             // Lengths keep ("ab", "c") apart from ("a", "bc").
             hash.update(format!("{}:{name}={}:{value};", name.len(), value.len()));
         }
@@ -64,10 +67,17 @@ impl Store {
     /// # Errors
     /// A sentence that names the folder.
     pub fn open(root: &Path) -> Result<Self> {
-        let explain = || format!("The output folder {} cannot be written; choose another one with -o.", root.display());
+        let explain = || {
+            format!(
+                "The output folder {} cannot be written; choose another one with -o.",
+                root.display()
+            )
+        };
         fs::create_dir_all(root.join(KEYS)).with_context(explain)?;
         tempfile::NamedTempFile::new_in(root).with_context(explain)?;
-        Ok(Self { root: root.to_owned() })
+        Ok(Self {
+            root: root.to_owned(),
+        })
     }
 
     /// The place of a product, `name` with slashes.
@@ -77,7 +87,9 @@ impl Store {
     }
 
     fn key_path(&self, name: &str) -> PathBuf {
-        self.root.join(KEYS).join(format!("{}.key", name.replace('/', "--")))
+        self.root
+            .join(KEYS)
+            .join(format!("{}.key", name.replace('/', "--")))
     }
 
     /// The bytes of a product, if it is there, whole, and was made from what `key` says.
@@ -98,19 +110,33 @@ impl Store {
     /// When the disk is full or the folder cannot be written.
     pub fn put(&self, name: &str, key: &Key, bytes: &[u8]) -> Result<()> {
         self.write(&self.path(name), bytes)?;
-        self.write(&self.key_path(name), format!("{} {}\n", key.0, sha256(bytes)).as_bytes())
+        self.write(
+            &self.key_path(name),
+            format!("{} {}\n", key.0, sha256(bytes)).as_bytes(),
+        )
     }
 
     /// Temporary file in the same folder, bytes, fsync, rename, fsync of the folder.
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<()> {
-        let explain = || format!("{} cannot be written; is the disk full or the folder read-only?", path.display());
+        let explain = || {
+            format!(
+                "{} cannot be written; is the disk full or the folder read-only?",
+                path.display()
+            )
+        };
         let folder = path.parent().unwrap_or(&self.root);
         fs::create_dir_all(folder).with_context(explain)?;
-        let mut file = tempfile::Builder::new().prefix(".part-").suffix(".tmp").tempfile_in(folder).with_context(explain)?;
+        let mut file = tempfile::Builder::new()
+            .prefix(".part-")
+            .suffix(".tmp")
+            .tempfile_in(folder)
+            .with_context(explain)?;
         file.write_all(bytes).with_context(explain)?;
         file.as_file().sync_all().with_context(explain)?;
         open_to_all(file.as_file()).with_context(explain)?;
-        file.persist(path).map_err(|e| e.error).with_context(explain)?;
+        file.persist(path)
+            .map_err(|e| e.error)
+            .with_context(explain)?;
         // The rename itself is safe once the folder is on the disk; where a folder cannot be opened (Windows) there is no such call.
         if let Ok(folder) = fs::File::open(folder) {
             let _ = folder.sync_all();
@@ -139,11 +165,18 @@ mod tests {
     fn a_product_counts_only_whole_and_for_its_key() {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).unwrap();
-        let (key, other) = (Key::new("frame", &[("n", "1")]), Key::new("frame", &[("n", "2")]));
+        let (key, other) = (
+            Key::new("frame", &[("n", "1")]),
+            Key::new("frame", &[("n", "2")]),
+        );
         assert_eq!(store.get("a/1.png", &key), None);
         store.put("a/1.png", &key, b"picture").unwrap();
         assert_eq!(store.get("a/1.png", &key).as_deref(), Some(&b"picture"[..]));
-        assert_eq!(store.get("a/1.png", &other), None, "made from something else");
+        assert_eq!(
+            store.get("a/1.png", &other),
+            None,
+            "made from something else"
+        );
         fs::write(store.path("a/1.png"), b"pict").unwrap();
         assert_eq!(store.get("a/1.png", &key), None, "torn");
     }

@@ -16,7 +16,7 @@ pub fn page(catalog: &Catalog, subjects: &[Subject], command: &str, backend: &st
         ("Program", format!("woven-catalog {}", version())),
         ("Rendering", format!("{backend} {}x{} pixels, {} paths a pixel in motion and {} at rest, up to {} bounces{}; seed {}.", p.size[0], p.size[1], p.samples, p.still_samples, p.depth, if p.denoise { ", remaining noise filtered" } else { "" }, p.seed)),
         ("Motion", format!("Mass-spring sheets of {} by {} cells in wind of {} m/s with gusts (standard deviation {} of the mean); {} frames at {} a second{}; seed {}.", m.mesh[0], m.mesh[1], m.wind, m.gusts, m.frames, m.fps, looping(m), m.seed)),
-        ("Lights", "Day: sun and clear sky outside the window. Evening: lamps of about 2800 K inside, dusk outside. Exposure is set for each light, the same for all fabrics.".to_owned()),
+        ("Lights", "Day: sun and clear sky outside the window. Evening: warm lamps inside, dusk outside. Exposure is set for each light, the same for all fabrics.".to_owned()),
     ];
     Page {
         title: catalog.title.clone(),
@@ -27,11 +27,21 @@ pub fn page(catalog: &Catalog, subjects: &[Subject], command: &str, backend: &st
 }
 
 fn looping(m: &Motion) -> String {
-    if m.blend == 0 { String::new() } else { format!(", the end led back to the beginning over {} frames", m.blend) }
+    if m.blend == 0 {
+        String::new()
+    } else {
+        format!(
+            ", the end led back to the beginning over {} frames",
+            m.blend
+        )
+    }
 }
 
 fn pairs<const N: usize>(rows: [(&str, String); N]) -> Vec<(String, String)> {
-    rows.into_iter().filter(|(_, text)| !text.is_empty()).map(|(label, text)| (label.to_owned(), text)).collect()
+    rows.into_iter()
+        .filter(|(_, text)| !text.is_empty())
+        .map(|(label, text)| (label.to_owned(), text))
+        .collect()
 }
 
 fn fabric(catalog: &Catalog, s: &Subject) -> FabricPart {
@@ -41,8 +51,15 @@ fn fabric(catalog: &Catalog, s: &Subject) -> FabricPart {
         facts.push(spec.maker.clone());
     }
     if let Some((transmittance, angle)) = s.summary.transmittance {
-        let at = if angle < 1.0 { "straight on".to_owned() } else { format!("at {angle:.0}°") };
-        facts.push(format!("transmits {} of the light {at}", percent(transmittance)));
+        let at = if angle < 1.0 {
+            "straight on".to_owned()
+        } else {
+            format!("at {angle:.0}°")
+        };
+        facts.push(format!(
+            "transmits {} of the light {at}",
+            percent(transmittance)
+        ));
     }
     facts.push(format!("{} open", percent(s.summary.openness)));
     let mut notes = s.summary.notes.clone();
@@ -68,11 +85,23 @@ fn fabric(catalog: &Catalog, s: &Subject) -> FabricPart {
 
 fn percent(share: f64) -> String {
     let value = share * 100.0;
-    if value >= 9.95 { format!("{value:.0} %") } else if value >= 0.995 { format!("{value:.1} %") } else { format!("{value:.2} %") }
+    if value >= 9.95 {
+        format!("{value:.0} %")
+    } else if value >= 0.995 {
+        format!("{value:.1} %")
+    } else {
+        format!("{value:.2} %")
+    }
 }
 
 fn row(p: &crate::optics::Parameter) -> Row {
-    Row { name: p.name.clone(), meaning: p.meaning.clone(), value: p.value, error: p.error, unit: String::new() }
+    Row {
+        name: p.name.clone(),
+        meaning: p.meaning.clone(),
+        value: p.value,
+        error: p.error,
+        unit: String::new(),
+    }
 }
 
 /// Videos of all lights, then stills.
@@ -87,8 +116,15 @@ fn shots(catalog: &Catalog, s: &Subject) -> Vec<Shot> {
         file: format!("{id}/{}.mp4", light.name()),
         poster: Some(format!("{id}/{}-poster.jpg", light.name())),
         title: format!("{}, in the wind", light.title()),
-        detail: format!("{:.1} s, {} frames a second", f64::from(m.frames) / f64::from(m.fps), m.fps),
-        alt: format!("Video: a pleated curtain of {name} moves in the wind of an open window, {}", scene(light)),
+        detail: format!(
+            "{:.1} s, {} frames a second",
+            f64::from(m.frames) / f64::from(m.fps),
+            m.fps
+        ),
+        alt: format!(
+            "Video: a pleated curtain of {name} moves in the wind of an open window, {}",
+            scene(light)
+        ),
         size,
     });
     let stills = catalog.lights.iter().map(|&light| Shot {
@@ -96,7 +132,10 @@ fn shots(catalog: &Catalog, s: &Subject) -> Vec<Shot> {
         poster: None,
         title: format!("{}, at rest", light.title()),
         detail: format!("{} paths a pixel", catalog.picture.still_samples),
-        alt: format!("A pleated curtain of {name} hangs still before a window, {}", scene(light)),
+        alt: format!(
+            "A pleated curtain of {name} hangs still before a window, {}",
+            scene(light)
+        ),
         size,
     });
     videos.chain(stills).collect()
@@ -106,23 +145,46 @@ fn ranking(s: &Subject) -> Option<(Vec<String>, Vec<Vec<String>>)> {
     if s.summary.ranking.is_empty() {
         return None;
     }
-    let head = ["Model", "Place", "RMS × 10⁴", "unseen × 10⁴", "AICc"].map(str::to_owned).to_vec();
+    let head = ["Model", "Place", "RMS × 10⁴", "unseen × 10⁴", "AICc"]
+        .map(str::to_owned)
+        .to_vec();
     let rows = s.summary.ranking.iter().map(|r| {
-        let cross = r.cross_e4.map_or_else(|| "–".to_owned(), |c| format!("{c:.1}"));
-        vec![r.label.clone(), r.place.to_string(), format!("{:.1}", r.rms_e4), cross, format!("{:.0}", r.aicc)]
+        let cross = r
+            .cross_e4
+            .map_or_else(|| "–".to_owned(), |c| format!("{c:.1}"));
+        vec![
+            r.label.clone(),
+            r.place.to_string(),
+            format!("{:.1}", r.rms_e4),
+            cross,
+            format!("{:.0}", r.aicc),
+        ]
     });
     Some((head, rows.collect()))
 }
 
 fn provenance(s: &Subject) -> Vec<(String, String)> {
-    let file = if s.measurement.builtin { format!("{} (beside this page in {}/)", s.measurement.file, s.spec.id) } else { s.measurement.file.clone() };
+    let file = if s.measurement.builtin {
+        format!(
+            "{} (beside this page in {}/)",
+            s.measurement.file, s.spec.id
+        )
+    } else {
+        s.measurement.file.clone()
+    };
     pairs([
         ("Measurement", file),
         ("Name in the file", s.summary.name.clone()),
         ("Source", s.spec.source.clone()),
         ("Licence", s.spec.licence.clone()),
         ("SHA-256", sha256(&s.measurement.bytes)),
-        ("Fabric file", format!("{}/fabric.toml, SHA-256 {}", s.spec.id, s.fabric_hash)),
-        ("Curtain", format!("{}/curtain.glb, SHA-256 {}", s.spec.id, s.clip_hash)),
+        (
+            "Fabric file",
+            format!("{}/fabric.toml, SHA-256 {}", s.spec.id, s.fabric_hash),
+        ),
+        (
+            "Curtain",
+            format!("{}/curtain.glb, SHA-256 {}", s.spec.id, s.clip_hash),
+        ),
     ])
 }

@@ -44,33 +44,53 @@ impl Preset {
     #[must_use]
     pub const fn exposure(self) -> f32 {
         match self {
-            Self::Day | Self::All => 1.6,
-            Self::Evening => 1.3,
+            Self::Day | Self::All => 2.3,
+            Self::Evening => 2.5,
         }
     }
 
     pub(super) const fn lamps(self) -> [f32; 3] {
         match self {
             Self::Day => [0.0; 3],
-            Self::Evening | Self::All => LAMPS,
+            Self::Evening => LAMPS,
+            Self::All => [
+                LAMPS[0] * LAMP_BOOST,
+                LAMPS[1] * LAMP_BOOST,
+                LAMPS[2] * LAMP_BOOST,
+            ],
         }
     }
 
     pub(super) fn sun(self) -> Option<Light> {
-        let light = Light::Sun { direction: sun_direction(), irradiance: SUN, angular_radius: 0.0047, layer: LAYER_SUN };
+        let light = Light::Sun {
+            direction: sun_direction(),
+            irradiance: SUN,
+            angular_radius: 0.0047,
+            layer: LAYER_SUN,
+        };
         (self != Self::Evening).then_some(light)
     }
 
     pub(super) fn sky(self) -> Environment {
-        let scale = if self == Self::Evening { DUSK } else { [1.0; 3] };
-        Environment { scale, ..bake(128, 64, day_sky) }
+        let scale = if self == Self::Evening {
+            DUSK
+        } else {
+            [1.0; 3]
+        };
+        Environment {
+            scale,
+            ..bake(128, 64, day_sky)
+        }
     }
 }
 
-/// Radiance of the lamp shades: about 2800 K.
-const LAMPS: [f32; 3] = [3.6, 2.15, 1.0];
-/// Irradiance of the sun on a surface that faces it; the sky's radiance is about 1, so the ratio is that of a clear day.
-const SUN: [f32; 3] = [13.0, 12.1, 10.6];
+/// Radiance of the lamp shades: warm white, about 3500 K, as an eye half adapted to it sees 2800 K.
+const LAMPS: [f32; 3] = [2.7, 1.92, 1.18];
+/// With all lights on, the lamps are this much brighter than in the evening, so that they get their share of the paths beside the sun;
+/// whoever mixes the layers takes it off again.
+pub const LAMP_BOOST: f32 = 8.0;
+/// Irradiance of the sun on a surface that faces it; the sky's radiance is about 1, so the ratio is that of a day with thin haze.
+const SUN: [f32; 3] = [5.2, 4.8, 4.2];
 /// The dusk sky as a share of the day's, a deep blue: evening is lamps + this share of the sky's layer.
 pub const DUSK: [f32; 3] = [0.016, 0.028, 0.060];
 
@@ -87,7 +107,11 @@ fn day_sky(d: Vec3) -> Vec3 {
     let horizon = Vec3::new(1.02, 1.12, 1.22);
     let sky = horizon.lerp(zenith, 1.0 - (-3.2 * up).exp());
     let aureole = Vec3::new(1.3, 1.22, 1.08) * ((d.dot(sun_direction()) - 1.0) * 9.0).exp();
-    if d.y < 0.0 { Vec3::new(0.20, 0.22, 0.17) } else { sky + aureole }
+    if d.y < 0.0 {
+        Vec3::new(0.20, 0.22, 0.17)
+    } else {
+        sky + aureole
+    }
 }
 
 /// A latitude-longitude picture of `radiance` in the convention of [`Environment`].
@@ -100,5 +124,12 @@ fn bake(width: u32, height: u32, radiance: impl Fn(Vec3) -> Vec3) -> Environment
             pixels.push(radiance(Vec3::new(sin * phi.sin(), cos, -sin * phi.cos())).to_array());
         }
     }
-    Environment { width, height, pixels, rotation: 0.0, scale: [1.0; 3], layer: LAYER_SKY }
+    Environment {
+        width,
+        height,
+        pixels,
+        rotation: 0.0,
+        scale: [1.0; 3],
+        layer: LAYER_SKY,
+    }
 }

@@ -16,8 +16,21 @@ impl Shape {
     /// The mesh, with the number of its material in the scene.
     #[must_use]
     pub(super) fn mesh(self, name: &str, material: usize) -> Mesh {
-        let Self { positions, normals, uvs, indices } = self;
-        Mesh { name: name.to_owned(), positions, normals, uvs, indices, material, moving: false }
+        let Self {
+            positions,
+            normals,
+            uvs,
+            indices,
+        } = self;
+        Mesh {
+            name: name.to_owned(),
+            positions,
+            normals,
+            uvs,
+            indices,
+            material,
+            moving: false,
+        }
     }
 
     fn vertex(&mut self, position: Vec3, normal: Vec3, uv: Vec2) -> u32 {
@@ -43,8 +56,17 @@ impl Shape {
     /// A board with sharp edges between two opposite corners.
     #[must_use]
     pub(super) fn board(self, min: Vec3, max: Vec3) -> Self {
-        let (x, y, z) = (Vec3::X * (max.x - min.x), Vec3::Y * (max.y - min.y), Vec3::Z * (max.z - min.z));
-        self.quad(min, y, x).quad(max, -x, -y).quad(min, x, z).quad(max, -z, -x).quad(min, z, y).quad(max, -y, -z)
+        let (x, y, z) = (
+            Vec3::X * (max.x - min.x),
+            Vec3::Y * (max.y - min.y),
+            Vec3::Z * (max.z - min.z),
+        );
+        self.quad(min, y, x)
+            .quad(max, -x, -y)
+            .quad(min, x, z)
+            .quad(max, -z, -x)
+            .quad(min, z, y)
+            .quad(max, -y, -z)
     }
 
     /// A board whose edges are rounded by `radius`, turned by `turn` radians about the vertical through `pivot`.
@@ -68,7 +90,9 @@ impl Shape {
             for i in 0..=STEPS {
                 for j in 0..=STEPS {
                     // Rows crowd at the rim, where the rounding is.
-                    let spread = |k: u32| (std::f32::consts::FRAC_PI_4 * (2.0 * k as f32 / STEPS as f32 - 1.0)).tan();
+                    let spread = |k: u32| {
+                        (std::f32::consts::FRAC_PI_4 * (2.0 * k as f32 / STEPS as f32 - 1.0)).tan()
+                    };
                     let out = (n + a * spread(i) + b * spread(j)).normalize();
                     let cube = n + a * spread(i).clamp(-1.0, 1.0) + b * spread(j).clamp(-1.0, 1.0);
                     let local = (cube * core) + out * radius;
@@ -104,7 +128,11 @@ impl Shape {
                 let (sin, cos) = (turn * std::f32::consts::TAU).sin_cos();
                 let normal = Vec3::new(cos * slope.x, slope.y, -sin * slope.x);
                 for (r, y, v) in [(r0, y0, 0.0), (r1, y1, 1.0)] {
-                    self.vertex(foot + Vec3::new(cos * r, y, -sin * r), normal, Vec2::new(turn, v));
+                    self.vertex(
+                        foot + Vec3::new(cos * r, y, -sin * r),
+                        normal,
+                        Vec2::new(turn, v),
+                    );
                 }
             }
             self.grid(first, around, 1);
@@ -120,8 +148,15 @@ impl Shape {
         let point = |i: u32, j: u32| {
             let theta = std::f32::consts::PI * i as f32 / RINGS as f32;
             let phi = std::f32::consts::TAU * (j % AROUND) as f32 / AROUND as f32;
-            let d = Vec3::new(theta.sin() * phi.cos(), theta.cos(), -theta.sin() * phi.sin());
-            let bump = (0..3).map(|k| bump(d, seed.wrapping_add(k), 2.5 + 2.5 * k as f32)).sum::<f32>() / 3.0;
+            let d = Vec3::new(
+                theta.sin() * phi.cos(),
+                theta.cos(),
+                -theta.sin() * phi.sin(),
+            );
+            let bump = (0..3)
+                .map(|k| bump(d, seed.wrapping_add(k), 2.5 + 2.5 * k as f32))
+                .sum::<f32>()
+                / 3.0;
             center + d * radii * (1.0 + lumps * bump)
         };
         let first = self.positions.len() as u32;
@@ -130,8 +165,15 @@ impl Shape {
                 let p = point(i, j);
                 let east = point(i, (j + 1) % AROUND) - point(i, (j + AROUND - 1) % AROUND);
                 let south = point((i + 1).min(RINGS), j) - point(i.saturating_sub(1), j);
-                let normal = south.cross(east).try_normalize().unwrap_or((p - center).normalize_or_zero());
-                self.vertex(p, normal, Vec2::new(j as f32 / AROUND as f32, i as f32 / RINGS as f32));
+                let normal = south
+                    .cross(east)
+                    .try_normalize()
+                    .unwrap_or((p - center).normalize_or_zero());
+                self.vertex(
+                    p,
+                    normal,
+                    Vec2::new(j as f32 / AROUND as f32, i as f32 / RINGS as f32),
+                );
             }
         }
         self.grid(first, RINGS, AROUND);
@@ -143,16 +185,25 @@ impl Shape {
     pub(super) fn leaf(mut self, root: Vec3, lean: Vec3, rise: f32, width: f32) -> Self {
         const STEPS: u32 = 10;
         let side = Vec3::Y.cross(lean).normalize_or_zero();
-        let at = |t: f32| root + lean * t + Vec3::Y * rise * (1.0 - (1.0 - 1.6 * t).powi(2)) / (1.0 - 0.36);
+        let at = |t: f32| {
+            root + lean * t + Vec3::Y * rise * (1.0 - (1.0 - 1.6 * t).powi(2)) / (1.0 - 0.36)
+        };
         let first = self.positions.len() as u32;
         for i in 0..=STEPS {
             let t = i as f32 / STEPS as f32;
             let along = (at(t + 0.01) - at(t - 0.01)).normalize_or_zero();
-            let blade = ((t - 0.15).max(0.0) / 0.85 * std::f32::consts::PI).sin().max(0.06) * width;
+            let blade = ((t - 0.15).max(0.0) / 0.85 * std::f32::consts::PI)
+                .sin()
+                .max(0.06)
+                * width;
             let normal = along.cross(side).normalize_or_zero();
             for s in [-1.0_f32, 0.0, 1.0] {
                 let fold = Vec3::Y * (s.abs() * blade * 0.35);
-                self.vertex(at(t) + side * (s * blade) + fold, (normal + side * s * -0.3).normalize(), Vec2::new(s, t));
+                self.vertex(
+                    at(t) + side * (s * blade) + fold,
+                    (normal + side * s * -0.3).normalize(),
+                    Vec2::new(s, t),
+                );
             }
         }
         self.grid(first, STEPS, 2);
@@ -162,9 +213,16 @@ impl Shape {
 
 /// Smooth bumps in -1..1 over directions: a few sine waves whose ways are chosen by `seed`.
 fn bump(d: Vec3, seed: u32, frequency: f32) -> f32 {
-    let axis = Vec3::new(noise(seed, 0) - 0.5, noise(seed, 1) - 0.5, noise(seed, 2) - 0.5).try_normalize().unwrap_or(Vec3::X);
+    let axis = Vec3::new(
+        noise(seed, 0) - 0.5,
+        noise(seed, 1) - 0.5,
+        noise(seed, 2) - 0.5,
+    )
+    .try_normalize()
+    .unwrap_or(Vec3::X);
     let other = axis.any_orthonormal_vector();
-    (axis.dot(d) * frequency + 6.0 * noise(seed, 3)).sin() * (other.dot(d) * frequency * 1.3 + 6.0 * noise(seed, 4)).cos()
+    (axis.dot(d) * frequency + 6.0 * noise(seed, 3)).sin()
+        * (other.dot(d) * frequency * 1.3 + 6.0 * noise(seed, 4)).cos()
 }
 
 /// A number in 0..1 that depends on the two given ones alone.
@@ -182,21 +240,34 @@ mod tests {
 
     /// Signed volume by the divergence theorem: positive when all triangles face outwards.
     fn volume(shape: &Shape) -> f32 {
-        shape.indices.iter().map(|t| t.map(|i| shape.positions[i as usize])).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+        shape
+            .indices
+            .iter()
+            .map(|t| t.map(|i| shape.positions[i as usize]))
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum()
     }
 
     #[test]
     fn solids_face_outwards_and_hold_what_they_should() {
         let board = Shape::default().board(Vec3::new(1.0, 2.0, 3.0), Vec3::new(2.0, 4.0, 6.0));
         assert!((volume(&board) - 6.0).abs() < 1e-3);
-        let turned = Shape::default().turned(Vec3::ZERO, &[(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)], 64);
+        let turned = Shape::default().turned(
+            Vec3::ZERO,
+            &[(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)],
+            64,
+        );
         // A 64-gon has 0.16 % less area than its circle.
         assert!((volume(&turned) - std::f32::consts::TAU).abs() < 0.02);
         let ball = Shape::default().ball(Vec3::ZERO, Vec3::ONE, 0.0, 1);
         assert!((volume(&ball) / 4.19 - 1.0).abs() < 0.03);
         let cushion = Shape::default().cushion(Vec3::ZERO, Vec3::ONE, 0.1, (0.7, Vec3::ZERO));
         // Rounding takes (1 - π/4) r² off each of twelve edges: about 2.4 %.
-        assert!((0.95..0.99).contains(&volume(&cushion)), "{}", volume(&cushion));
+        assert!(
+            (0.95..0.99).contains(&volume(&cushion)),
+            "{}",
+            volume(&cushion)
+        );
     }
 
     #[test]
@@ -213,7 +284,10 @@ mod tests {
                 let [a, b, c] = t.map(|i| shape.positions[i as usize]);
                 let face = (b - a).cross(c - a);
                 let mean: Vec3 = t.iter().map(|&i| shape.normals[i as usize]).sum();
-                assert!(face.length() < 1e-7 || face.dot(mean) > 0.0, "shape {k}, triangle {t:?}");
+                assert!(
+                    face.length() < 1e-7 || face.dot(mean) > 0.0,
+                    "shape {k}, triangle {t:?}"
+                );
             }
         }
     }

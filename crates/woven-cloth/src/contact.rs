@@ -74,7 +74,7 @@ impl Obstacles {
 }
 
 /// Acceleration of vertices that touch, m/s².
-const REPULSION: f64 = 300.0;
+const REPULSION: f64 = 150.0;
 
 /// Contact of the cloth with itself: vertices of different folds keep their distance.
 ///

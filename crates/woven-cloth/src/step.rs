@@ -4,8 +4,9 @@
 //! 1. predict: base = (4x - x₋)/3, ṽ = (4v - v₋)/3, x̃ = base + h' ṽ (the second-order backward difference formula);
 //! 2. x̃ += h'² (g + M⁻¹ f(x̃)) with shear, bending and air. Evaluated at x̃ this equals the implicit formula with a frequency
 //!    ω² / (1 - h'²ω²): stable while h'ω < 1, dissipative at high and neutral at low frequencies;
-//! 3. all weft threads, then all warp threads, each by one exact tridiagonal solve (`line`);
-//! 4. contact; v = (x - base)/h'.
+//! 3. contact of the cloth with itself;
+//! 4. all weft threads, then all warp threads, each by one exact tridiagonal solve (`line`);
+//! 5. obstacles; v = (x - base)/h'.
 //!
 //! The first step after a start is backward Euler (h' = dt, base = x). Damping acts on the rate of deformation only: forces are
 //! taken at x̃ + tau ṽ.
@@ -120,15 +121,16 @@ impl Stepper {
         }
         self.predict(sheet, hp);
         self.add_forces(sheet, hp);
+        // Before the threads are solved: contact may push folds apart but never leaves a thread stretched.
+        if let Some(contact) = &mut self.self_contact {
+            contact.resolve(sheet, &mut self.pred, hp);
+        }
         let damping = sheet.mechanics.stretch_damping / hp;
         for j0 in (0..ny).step_by(LANES) {
             self.weft_block(sheet, j0, hp, damping);
         }
         for i0 in (0..nx).step_by(LANES) {
             self.warp_block(sheet, i0, hp, damping);
-        }
-        if let Some(contact) = &mut self.self_contact {
-            contact.resolve(sheet, &mut self.pred, hp);
         }
         self.obstacles.resolve(sheet, &mut self.pred);
         for &k in &self.pins {

@@ -1,4 +1,4 @@
-//! One picture of the stage, the smallest use of this library: `cargo run --release -p woven-catalog --example look -- day 320x240 16 look.png [FABRIC.toml [CURTAIN.glb [FRAME]]]`.
+//! One picture of the stage, the smallest use of this library: `cargo run --release -p woven-catalog --example look -- day 320x240 16 look.png [FABRIC.toml [CURTAIN.glb [FRAME [STILL-SAMPLES]]]]`.
 
 use std::path::Path;
 
@@ -51,10 +51,25 @@ fn main() -> Result<()> {
         denoise: catalog.picture.denoise,
         layers: false,
     };
-    let picture = photographer.set_up(&stage, &shoot)?.take(
+    let mut set = photographer.set_up(&stage, &shoot)?;
+    let samples = word(2, "16").parse()?;
+    // With a number of samples for a still, the frame is steadied by it like those of the catalog.
+    let anchor = match words.get(7) {
+        Some(many) => Some(
+            set.still(
+                &cloth::mesh(&clip, None),
+                samples,
+                many.parse()?,
+                &mut |_| true,
+            )?
+            .1,
+        ),
+        None => None,
+    };
+    let picture = set.take(
         &cloth::mesh(&clip, frame),
-        word(2, "16").parse()?,
-        None,
+        samples,
+        anchor.as_ref(),
         &mut |_| true,
     )?;
     std::fs::write(word(3, "look.png"), picture.png()?)?;

@@ -157,7 +157,7 @@ impl Default for Picture {
         Self {
             size: [480, 360],
             samples: 6,
-            still_samples: 64,
+            still_samples: 48,
             depth: 4,
             seed: 1,
             denoise: true,
@@ -170,7 +170,7 @@ impl Picture {
     #[must_use]
     pub fn samples_in(&self, light: Preset) -> u32 {
         if light == Preset::Evening {
-            self.samples.div_ceil(2)
+            (self.samples * 2).div_ceil(3)
         } else {
             self.samples
         }

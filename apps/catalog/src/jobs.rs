@@ -112,7 +112,7 @@ const FIT_WORK: f64 = 12.0;
 /// Work of a simulated frame per vertex of the mesh.
 const CLOTH_WORK: f64 = 3.0e-5;
 /// Work of a path.
-const PATH_WORK: f64 = 1.5e-6;
+const PATH_WORK: f64 = 2.4e-6;
 /// Work of filtering a pixel.
 const FILTER_WORK: f64 = 2.0e-6;
 /// Work of encoding a pixel of a video.

@@ -190,7 +190,7 @@ impl Set {
         let begun = self.renderer.film()?;
         self.gather(many.max(few), many, progress)?;
         let film = self.renderer.film()?;
-        let anchor = Anchor::new(&begun, &film);
+        let anchor = Anchor::new(&begun, &film, few as f32 / many.max(few) as f32);
         Ok((self.develop(film), anchor))
     }
 

@@ -16,7 +16,9 @@ mod shape;
 mod texture;
 
 use glam::{Vec2, Vec3};
-use woven_render::scene::{Camera, LAYER_LAMPS, Material, Mesh, Scene, Texture, TextureUse};
+use woven_render::scene::{
+    Camera, LAYER_LAMPS, LAYER_SKY, Material, Mesh, Scene, Texture, TextureUse,
+};
 
 pub use light::{DUSK, LAMP_BOOST, Preset, sun_direction};
 pub use room::{OPENING, RAIL_DISTANCE, RAIL_HEIGHT, ROOM, WALL, portal};
@@ -53,7 +55,7 @@ impl Stage {
     pub fn new(preset: Preset) -> Self {
         let mut builder = Builder::default();
         room::build(&mut builder);
-        furniture::build(&mut builder, preset.lamps());
+        furniture::build(&mut builder, preset.lamps(), preset.far_window());
         outside::build(&mut builder);
         let mut scene = builder.scene;
         let cloth = scene.materials.len();
@@ -175,6 +177,15 @@ impl Builder {
         })
     }
 
+    /// A pane that is as bright as the sky it shows, and belongs to its layer.
+    fn window(&mut self, name: &str, radiance: [f32; 3]) -> usize {
+        let pane = Material {
+            layer: LAYER_SKY,
+            ..Material::lamp(name, radiance, false)
+        };
+        self.material(pane)
+    }
+
     fn lamp(&mut self, name: &str, radiance: [f32; 3], albedo: [f32; 3]) -> usize {
         let shade = Material {
             emission: radiance,
@@ -242,7 +253,7 @@ mod tests {
                 .scene
                 .materials
                 .iter()
-                .any(|m| m.emission != [0.0; 3])
+                .any(|m| m.layer == LAYER_LAMPS && m.emission != [0.0; 3])
         };
         assert!(!lit(Preset::Day) && lit(Preset::Evening) && lit(Preset::All));
         assert!(Stage::new(Preset::Evening).scene.lights.is_empty());

@@ -10,12 +10,22 @@ use super::{Builder, texture};
 /// Foot of the floor lamp [m].
 const LAMP: Vec3 = Vec3::new(1.50, 0.0, 0.62);
 
-/// Adds the furniture; `lamp` is the radiance of the lamp shades, dark when the lamps are off.
-pub(super) fn build(b: &mut Builder, lamp: [f32; 3]) {
+/// Adds the furniture; `lamp` is the radiance of the lamp shades, dark when the lamps are off, `far_window` that of a window
+/// behind the eye.
+pub(super) fn build(b: &mut Builder, lamp: [f32; 3], far_window: [f32; 3]) {
     armchair(b);
     side_table(b);
     plant(b);
     lamps(b, lamp);
+
+    // The room's other window, behind the eye: soft light from where the viewer stands.
+    let far = b.window("far window", far_window);
+    let pane = Shape::default().quad(
+        Vec3::new(1.75, 0.9, ROOM.1.z - 0.03),
+        Vec3::X * -1.3,
+        Vec3::Y * 1.3,
+    );
+    b.add(pane.mesh("far window", far));
 
     let weave = b.texture(texture::rug());
     // The rug's own coordinates are metres along z and x; one repeat is the whole rug.

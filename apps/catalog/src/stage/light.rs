@@ -45,7 +45,7 @@ impl Preset {
     pub const fn exposure(self) -> f32 {
         match self {
             Self::Day | Self::All => 2.3,
-            Self::Evening => 2.5,
+            Self::Evening => 2.4,
         }
     }
 
@@ -61,6 +61,20 @@ impl Preset {
         }
     }
 
+    /// Radiance of the window behind the eye, a share of the sky's.
+    pub(super) fn far_window(self) -> [f32; 3] {
+        let scale = self.sky_scale();
+        [0, 1, 2].map(|c| FAR_WINDOW[c] * scale[c])
+    }
+
+    fn sky_scale(self) -> [f32; 3] {
+        if self == Self::Evening {
+            DUSK
+        } else {
+            [1.0; 3]
+        }
+    }
+
     pub(super) fn sun(self) -> Option<Light> {
         let light = Light::Sun {
             direction: sun_direction(),
@@ -72,18 +86,15 @@ impl Preset {
     }
 
     pub(super) fn sky(self) -> Environment {
-        let scale = if self == Self::Evening {
-            DUSK
-        } else {
-            [1.0; 3]
-        };
         Environment {
-            scale,
+            scale: self.sky_scale(),
             ..bake(128, 64, day_sky)
         }
     }
 }
 
+/// Radiance of the window behind the eye by day: sky and a bright wall across the street.
+const FAR_WINDOW: [f32; 3] = [1.35, 1.45, 1.6];
 /// Radiance of the lamp shades: warm white, about 3500 K, as an eye half adapted to it sees 2800 K.
 const LAMPS: [f32; 3] = [2.7, 1.92, 1.18];
 /// With all lights on, the lamps are this much brighter than in the evening, so that they get their share of the paths beside the sun;

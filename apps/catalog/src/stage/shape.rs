@@ -262,9 +262,9 @@ mod tests {
         let ball = Shape::default().ball(Vec3::ZERO, Vec3::ONE, 0.0, 1);
         assert!((volume(&ball) / 4.19 - 1.0).abs() < 0.03);
         let cushion = Shape::default().cushion(Vec3::ZERO, Vec3::ONE, 0.1, (0.7, Vec3::ZERO));
-        // Rounding takes (1 - π/4) r² off each of twelve edges: about 2.4 %.
+        // The faces swell from 0.971 at the edges to 1 in the middle (radius / √2 there), and the edges are rounded.
         assert!(
-            (0.95..0.99).contains(&volume(&cushion)),
+            (0.86..0.93).contains(&volume(&cushion)),
             "{}",
             volume(&cushion)
         );

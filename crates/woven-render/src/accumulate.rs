@@ -96,9 +96,7 @@ impl Accumulation {
         let number =
             |i: usize| u32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
         let (width, height, samples) = (number(4), number(8), number(12));
-        let count = (width as usize)
-            .checked_mul(height as usize)
-            .unwrap_or(usize::MAX);
+        let count = (width as usize).saturating_mul(height as usize);
         ensure!(
             count.checked_mul(size_of::<PixelSum>()) == Some(bytes.len() - 16),
             "the checkpoint of {width} x {height} pixels is cut short ({} bytes); start the render anew",

@@ -119,7 +119,10 @@ impl Bvh {
     fn child_bounds(&self, child: u32, corners: &[Corners]) -> Aabb {
         if child == EMPTY {
             // A box that no ray meets, without infinities.
-            return Aabb { min: Vec3A::splat(1e30), max: Vec3A::splat(-1e30) };
+            return Aabb {
+                min: Vec3A::splat(1e30),
+                max: Vec3A::splat(-1e30),
+            };
         }
         if child & LEAF != 0 {
             let first = (child & !LEAF) as usize * 4;

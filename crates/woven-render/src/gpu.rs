@@ -10,6 +10,7 @@ pub use pipeline::source;
 
 use anyhow::{Result, bail, ensure};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crate::accumulate::{Accumulation, PixelSum};
@@ -28,10 +29,36 @@ const LIMIT: Duration = Duration::from_millis(200);
 /// A device that does not answer for this long is lost.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// A device with a scene on it.
-pub(crate) struct Gpu {
+/// A device and the compiled shader: made once in a process and shared, for compiling takes seconds.
+struct Context {
     device: Device,
     pipeline: Pipeline,
+}
+
+/// The contexts so far: without and with software adapters.
+static SHARED: Mutex<[Option<Arc<Context>>; 2]> = Mutex::new([None, None]);
+
+impl Context {
+    fn shared(software: bool) -> Result<Arc<Self>> {
+        let mut shared = SHARED
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let slot = &mut shared[usize::from(software)];
+        if let Some(context) = slot.take().filter(|c| c.device.check().is_ok()) {
+            *slot = Some(Arc::clone(&context));
+            return Ok(context);
+        }
+        let device = Device::open(software)?;
+        let pipeline = device.guarded("compiling the shader", || Pipeline::new(&device.device))?;
+        let context = Arc::new(Self { device, pipeline });
+        *slot = Some(Arc::clone(&context));
+        Ok(context)
+    }
+}
+
+/// A device with a scene on it.
+pub(crate) struct Gpu {
+    context: Arc<Context>,
     buffers: Buffers,
     globals: crate::table::Globals,
     samples: u32,
@@ -46,12 +73,10 @@ pub(crate) struct Gpu {
 impl Gpu {
     /// Sets up a device, compiles the shader and uploads the scene. Without `software`, a software adapter is no GPU.
     pub(crate) fn new(table: &Table, view: &View, software: bool) -> Result<Self> {
-        let device = Device::open(software)?;
-        let pipeline = device.guarded("compiling the shader", || Pipeline::new(&device.device))?;
-        let buffers = Buffers::new(&device, &pipeline, table, view)?;
+        let context = Context::shared(software)?;
+        let buffers = Buffers::new(&context.device, &context.pipeline, table, view)?;
         Ok(Self {
-            device,
-            pipeline,
+            context,
             buffers,
             globals: table.globals,
             samples: 0,
@@ -63,7 +88,7 @@ impl Gpu {
     }
 
     pub(crate) fn name(&self) -> &str {
-        &self.device.name
+        &self.context.device.name
     }
 
     pub(crate) fn samples(&self) -> u32 {
@@ -88,7 +113,9 @@ impl Gpu {
             let together = (self.load / blocks).clamp(1, count - done);
             let mut block = 0;
             while block < blocks {
-                let range = (self.load / together).clamp(1, blocks - block).min(self.device.max_groups);
+                let range = (self.load / together)
+                    .clamp(1, blocks - block)
+                    .min(self.context.device.max_groups);
                 let frame = Frame::new(view, &self.globals, self.samples, together, block, range);
                 let began = Instant::now();
                 self.submit(&frame, range)?;
@@ -102,18 +129,22 @@ impl Gpu {
     }
 
     fn submit(&self, frame: &Frame, groups: u32) -> Result<()> {
-        let (device, queue) = (&self.device.device, &self.device.queue);
+        let (device, queue) = (&self.context.device.device, &self.context.device.queue);
         queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(frame));
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("samples") });
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("samples"),
+        });
         {
-            let mut pass =
-                encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("path"), timestamp_writes: None });
-            pass.set_pipeline(&self.pipeline.pipeline);
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("path"),
+                timestamp_writes: None,
+            });
+            pass.set_pipeline(&self.context.pipeline.pipeline);
             pass.set_bind_group(0, &self.buffers.group, &[]);
             pass.dispatch_workgroups(groups, 1, 1);
         }
         let index = queue.submit([encoder.finish()]);
-        self.device.wait(index, PATIENCE)
+        self.context.device.wait(index, PATIENCE)
     }
 
     /// Sizes the next submit by the time of the last.
@@ -134,19 +165,26 @@ impl Gpu {
             (sums.width, sums.height) == (self.width, self.height),
             "the sums have another size than the picture; start the render anew"
         );
-        self.device.queue.write_buffer(&self.buffers.sums, 0, bytemuck::cast_slice(&sums.pixels));
+        self.context.device.queue.write_buffer(
+            &self.buffers.sums,
+            0,
+            bytemuck::cast_slice(&sums.pixels),
+        );
         self.samples = sums.samples;
-        self.device.check()
+        self.context.device.check()
     }
 
     /// Reads the sums back.
     pub(crate) fn read(&self, sums: &mut Accumulation) -> Result<()> {
-        let bytes = self.device.read(&self.buffers.sums)?;
+        let bytes = self.context.device.read(&self.buffers.sums)?;
         let size = sums.pixels.len() * size_of::<PixelSum>();
         if bytes.len() < size {
             bail!("the GPU gave {} bytes back instead of {size}", bytes.len());
         }
-        sums.pixels = bytes[..size].chunks_exact(size_of::<PixelSum>()).map(bytemuck::pod_read_unaligned).collect();
+        sums.pixels = bytes[..size]
+            .chunks_exact(size_of::<PixelSum>())
+            .map(bytemuck::pod_read_unaligned)
+            .collect();
         sums.samples = self.samples;
         Ok(())
     }
@@ -154,6 +192,7 @@ impl Gpu {
     /// A mesh has moved: uploads the table anew, keeping device and pipeline.
     pub(crate) fn moved(&mut self, table: &Table) -> Result<()> {
         self.globals = table.globals;
-        self.buffers.update(&self.device, &self.pipeline, table)
+        self.buffers
+            .update(&self.context.device, &self.context.pipeline, table)
     }
 }

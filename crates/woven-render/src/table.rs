@@ -169,8 +169,8 @@ pub struct Globals {
     pub soft_lights: u32,
     /// Scale of the offset that keeps a ray off the surface it leaves [m].
     pub offset: f32,
-    /// Unused.
-    pub pad: u32,
+    /// 4, the taps of a bilinear texture: a loop bound that shader compilers do not know.
+    pub taps: u32,
 }
 
 /// The whole table.
@@ -267,6 +267,7 @@ impl Table {
         let (lo, hi) = table.bvh.bounds();
         let size = lo.abs().max(hi.abs()).max_element();
         table.globals.offset = 1e-5 * size.clamp(0.01, 1e6);
+        table.globals.taps = 4;
         Ok(table)
     }
 

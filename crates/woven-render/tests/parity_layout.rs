@@ -10,11 +10,18 @@ use woven_render::table::{Globals, LightRow, MaterialRow, Shade, TextureRow};
 
 /// Name, offset of each member, and the size of a struct of the shader.
 fn layout(module: &Module, name: &str) -> (Vec<(String, u32)>, u32) {
-    let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
+    let found = module
+        .types
+        .iter()
+        .find(|(_, t)| t.name.as_deref() == Some(name));
     match found.map(|(_, t)| &t.inner) {
-        Some(TypeInner::Struct { members, span }) => {
-            (members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span)
-        }
+        Some(TypeInner::Struct { members, span }) => (
+            members
+                .iter()
+                .map(|m| (m.name.clone().unwrap_or_default(), m.offset))
+                .collect(),
+            *span,
+        ),
         _ => panic!("the shader has no struct {name}"),
     }
 }
@@ -32,28 +39,66 @@ macro_rules! same {
 #[test]
 fn rows_lie_where_the_shader_reads_them() {
     let text = source();
-    let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
+    let module = naga::front::wgsl::parse_str(&text)
+        .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
     let flags = naga::valid::ValidationFlags::all();
-    naga::valid::Validator::new(flags, naga::valid::Capabilities::empty()).validate(&module).expect("a valid shader");
+    naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
+        .validate(&module)
+        .expect("a valid shader");
     let m = &module;
     same!(m, Node, lo, hi, child);
     same!(m, Packet, v0, e1, e2, gap);
-    same!(m, Shade, n0, n1, n2, weft, v, material, light, mesh, triangle);
     same!(
-        m, MaterialRow, linear, shape, weights, emission, flags, layer, color_texture, coverage_texture,
-        emission_texture, alpha_cutoff, gap, cover
-    );
-    same!(m, LightRow, p, kind, u, layer, v, place, n, area, radiance, cumulative);
-    same!(
-        m, Globals, sky_scale, lights, portals, sky_width, sky_height, sky_turn, portal_share, sky_light, sky_layer,
-        soft_lights, offset, pad
+        m, Shade, n0, n1, n2, weft, v, material, light, mesh, triangle
     );
     same!(
-        m, Frame, eye, aperture, right, focus, up, width, forward, height, lens_x, depth, lens_y, seed, first, count,
-        block, blocks, globals
+        m,
+        MaterialRow,
+        linear,
+        shape,
+        weights,
+        emission,
+        flags,
+        layer,
+        color_texture,
+        coverage_texture,
+        emission_texture,
+        alpha_cutoff,
+        gap,
+        cover
+    );
+    same!(
+        m, LightRow, p, kind, u, layer, v, place, n, area, radiance, cumulative
+    );
+    same!(
+        m,
+        Globals,
+        sky_scale,
+        lights,
+        portals,
+        sky_width,
+        sky_height,
+        sky_turn,
+        portal_share,
+        sky_light,
+        sky_layer,
+        soft_lights,
+        offset,
+        taps
+    );
+    same!(
+        m, Frame, eye, aperture, right, focus, up, width, forward, height, lens_x, depth, lens_y,
+        seed, first, count, block, blocks, globals
     );
     same!(m, PixelSum, light, albedo, normal);
     // Texture rows are read by words: the shader's constant is Rust's size.
-    assert!(text.contains(&format!("const TEXTURE_ROW: u32 = {}u;", size_of::<TextureRow>() / 4)));
-    assert_eq!((offset_of!(TextureRow, first), offset_of!(TextureRow, map_v)), (32, 16));
+    assert!(text.contains(&format!(
+        "const TEXTURE_ROW: u32 = {}u;",
+        size_of::<TextureRow>() / 4
+    )));
+    assert!(text.contains("const SRGB: u32 = 256u;"));
+    assert_eq!(
+        (offset_of!(TextureRow, first), offset_of!(TextureRow, map_v)),
+        (32, 16)
+    );
 }

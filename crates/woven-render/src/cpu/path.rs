@@ -20,6 +20,10 @@ pub(crate) const CROSSINGS: u32 = 64;
 /// Sets of random numbers: 0 camera, 1.. crossings, from here two a bounce.
 pub(crate) const BOUNCES: u32 = CROSSINGS + 1;
 
+/// A path survives with the probability of what it carries times this. Measured on the bench scene (relMSE x CPU-s at 160 x 120,
+/// 32 spp; `examples/measure.rs`): 1 gives 0.095, 2 0.070, 3 0.065, 5 0.076, no roulette 0.078.
+const ROULETTE: f32 = 3.0;
+
 /// What is the same for all samples of a picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
@@ -238,7 +242,7 @@ fn follow(table: &Table, view: &View, mut v: Vertex, rng: &mut Rng, light: &mut 
         }
         v.throughput *= surface::evaluate(m, &v.s, wi, v.wo) * (wi.z.abs() / pdf);
         // Russian roulette by what the path still carries.
-        let q = v.throughput.max_element();
+        let q = v.throughput.max_element() * ROULETTE;
         if q <= 0.0 {
             return;
         }

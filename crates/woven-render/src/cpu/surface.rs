@@ -220,16 +220,21 @@ fn decode(texel: u32, t: &TextureRow) -> [f32; 4] {
     if t.flags & 16 == 0 {
         return c;
     }
-    // sRGB, IEC 61966-2-1.
-    let linear = |x: f32| {
-        if x <= 0.04045 {
-            x * (1.0 / 12.92)
-        } else {
-            ((x + 0.055) * (1.0 / 1.055)).powf(2.4)
-        }
-    };
-    [linear(c[0]), linear(c[1]), linear(c[2]), c[3]]
+    let linear = |k: u32| SRGB[((texel >> (8 * k)) & 255) as usize];
+    [linear(0), linear(1), linear(2), c[3]]
 }
+
+/// sRGB decoded (IEC 61966-2-1), for 0..255.
+pub(crate) static SRGB: std::sync::LazyLock<[f32; 256]> = std::sync::LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let x = i as f64 / 255.0;
+        (if x <= 0.04045 {
+            x / 12.92
+        } else {
+            ((x + 0.055) / 1.055).powf(2.4)
+        }) as f32
+    })
+});
 
 /// Radiance that the surface gives off towards `wo`.
 pub(crate) fn emission(table: &Table, material: &MaterialRow, s: &Surface, wo: Vec3) -> Vec3 {

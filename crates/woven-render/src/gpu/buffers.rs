@@ -14,7 +14,10 @@ use crate::table::{Globals, LightRow, MaterialRow, Shade, Table};
 /// What one submit is told.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C, align(16))]
-#[allow(missing_docs, reason = "the fields of the shader's Frame, see cpu/path.rs's View")]
+#[allow(
+    missing_docs,
+    reason = "the fields of the shader's Frame, see cpu/path.rs's View"
+)]
 pub struct Frame {
     pub eye: [f32; 3],
     pub aperture: f32,
@@ -36,7 +39,14 @@ pub struct Frame {
 }
 
 impl Frame {
-    pub(crate) fn new(v: &View, globals: &Globals, first: u32, count: u32, block: u32, blocks: u32) -> Self {
+    pub(crate) fn new(
+        v: &View,
+        globals: &Globals,
+        first: u32,
+        count: u32,
+        block: u32,
+        blocks: u32,
+    ) -> Self {
         let a = |v: Vec3| v.to_array();
         Self {
             eye: a(v.eye),
@@ -69,21 +79,49 @@ pub(super) struct Buffers {
 }
 
 impl Buffers {
-    pub(super) fn new(device: &Device, pipeline: &Pipeline, table: &Table, view: &View) -> Result<Self> {
+    pub(super) fn new(
+        device: &Device,
+        pipeline: &Pipeline,
+        table: &Table,
+        view: &View,
+    ) -> Result<Self> {
         use wgpu::BufferUsages as Use;
         let pixels = u64::from(view.width) * u64::from(view.height);
-        let frame = buffer(device, "frame", size_of::<Frame>() as u64, Use::UNIFORM | Use::COPY_DST)?;
+        let frame = buffer(
+            device,
+            "frame",
+            size_of::<Frame>() as u64,
+            Use::UNIFORM | Use::COPY_DST,
+        )?;
         let size = pixels * size_of::<PixelSum>() as u64;
-        let sums = buffer(device, "picture", size, Use::STORAGE | Use::COPY_DST | Use::COPY_SRC)?;
+        let sums = buffer(
+            device,
+            "picture",
+            size,
+            Use::STORAGE | Use::COPY_DST | Use::COPY_SRC,
+        )?;
         let scene = upload(device, table)?;
         let group = bind(device, pipeline, &frame, &scene, &sums);
-        Ok(Self { frame, sums, group, scene })
+        Ok(Self {
+            frame,
+            sums,
+            group,
+            scene,
+        })
     }
 
     /// Writes a changed table; buffers that fit are kept.
-    pub(super) fn update(&mut self, device: &Device, pipeline: &Pipeline, table: &Table) -> Result<()> {
+    pub(super) fn update(
+        &mut self,
+        device: &Device,
+        pipeline: &Pipeline,
+        table: &Table,
+    ) -> Result<()> {
         let rows = rows(table);
-        let same = rows.iter().zip(&self.scene).all(|((_, bytes), b)| bytes.len() as u64 == b.size());
+        let same = rows
+            .iter()
+            .zip(&self.scene)
+            .all(|((_, bytes), b)| bytes.len() as u64 == b.size());
         if same {
             for ((_, bytes), b) in rows.iter().zip(&self.scene) {
                 device.queue.write_buffer(b, 0, bytes);
@@ -98,11 +136,21 @@ impl Buffers {
 
 /// The table's rows as bytes, in the order of the shader's bindings. No buffer is empty.
 fn rows(table: &Table) -> Vec<(&'static str, Vec<u8>)> {
-    let nowhere = Node { lo: [Vec4::splat(1e30); 3], hi: [Vec4::splat(-1e30); 3], child: [EMPTY; 4] };
-    let mut texels: Vec<u32> = Vec::new();
-    let head = table.textures.len() as u32 * 12;
+    let nowhere = Node {
+        lo: [Vec4::splat(1e30); 3],
+        hi: [Vec4::splat(-1e30); 3],
+        child: [EMPTY; 4],
+    };
+    let mut texels: Vec<u32> = crate::cpu::surface::SRGB
+        .iter()
+        .map(|x| x.to_bits())
+        .collect();
+    let head = 256 + table.textures.len() as u32 * 12;
     for t in &table.textures {
-        let moved = crate::table::TextureRow { first: t.first + head, ..*t };
+        let moved = crate::table::TextureRow {
+            first: t.first + head,
+            ..*t
+        };
         texels.extend(bytemuck::cast::<_, [u32; 12]>(moved));
     }
     texels.extend(&table.texels);
@@ -118,14 +166,23 @@ fn rows(table: &Table) -> Vec<(&'static str, Vec<u8>)> {
 }
 
 fn bytes<T: Pod>(rows: &[T], none: T) -> Vec<u8> {
-    if rows.is_empty() { bytemuck::bytes_of(&none).to_vec() } else { bytemuck::cast_slice(rows).to_vec() }
+    if rows.is_empty() {
+        bytemuck::bytes_of(&none).to_vec()
+    } else {
+        bytemuck::cast_slice(rows).to_vec()
+    }
 }
 
 fn upload(device: &Device, table: &Table) -> Result<Vec<wgpu::Buffer>> {
     use wgpu::BufferUsages as Use;
     let mut scene = Vec::new();
     for (name, bytes) in rows(table) {
-        let b = buffer(device, name, bytes.len() as u64, Use::STORAGE | Use::COPY_DST)?;
+        let b = buffer(
+            device,
+            name,
+            bytes.len() as u64,
+            Use::STORAGE | Use::COPY_DST,
+        )?;
         device.queue.write_buffer(&b, 0, &bytes);
         scene.push(b);
     }
@@ -133,7 +190,12 @@ fn upload(device: &Device, table: &Table) -> Result<Vec<wgpu::Buffer>> {
     Ok(scene)
 }
 
-fn buffer(device: &Device, name: &str, size: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+fn buffer(
+    device: &Device,
+    name: &str,
+    size: u64,
+    usage: wgpu::BufferUsages,
+) -> Result<wgpu::Buffer> {
     ensure!(
         size <= device.max_binding,
         "the {name} need {} MiB, {} takes at most {} MiB in one buffer; use --backend cpu",
@@ -142,7 +204,12 @@ fn buffer(device: &Device, name: &str, size: u64, usage: wgpu::BufferUsages) -> 
         device.max_binding >> 20
     );
     device.guarded(&format!("making room for the {name}"), || {
-        device.device.create_buffer(&wgpu::BufferDescriptor { label: Some(name), size, usage, mapped_at_creation: false })
+        device.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name),
+            size,
+            usage,
+            mapped_at_creation: false,
+        })
     })
 }
 
@@ -153,10 +220,15 @@ fn bind(
     scene: &[wgpu::Buffer],
     sums: &wgpu::Buffer,
 ) -> wgpu::BindGroup {
-    let all = std::iter::once(frame).chain(scene).chain(std::iter::once(sums));
+    let all = std::iter::once(frame)
+        .chain(scene)
+        .chain(std::iter::once(sums));
     let entries: Vec<_> = all
         .enumerate()
-        .map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() })
+        .map(|(i, b)| wgpu::BindGroupEntry {
+            binding: i as u32,
+            resource: b.as_entire_binding(),
+        })
         .collect();
     device.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("scene"),

@@ -48,7 +48,10 @@ fn sorted(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
 
 /// The adapter can hold what the shader binds.
 fn fits(adapter: &wgpu::Adapter) -> bool {
-    let compute = adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS);
+    let compute = adapter
+        .get_downlevel_capabilities()
+        .flags
+        .contains(wgpu::DownlevelFlags::COMPUTE_SHADERS);
     compute && adapter.limits().max_storage_buffers_per_shader_stage >= 8
 }
 
@@ -60,7 +63,9 @@ pub fn adapters() -> Vec<Adapter> {
         let info = a.get_info();
         Adapter {
             name: info.name.clone(),
-            driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+            driver: format!("{} {}", info.driver, info.driver_info)
+                .trim()
+                .to_owned(),
             backend: format!("{:?}", info.backend),
             kind: match info.device_type {
                 wgpu::DeviceType::DiscreteGpu => "discrete GPU",
@@ -99,7 +104,9 @@ impl Device {
                     "the only adapter, {}, is software; ask for it with --backend gpu if you want it",
                     a.get_info().name
                 ),
-                None => bail!("no Vulkan, Metal or Direct3D 12 adapter was found; install a driver or use --backend cpu"),
+                None => bail!(
+                    "no Vulkan, Metal or Direct3D 12 adapter was found; install a driver or use --backend cpu"
+                ),
             }
         };
         let info = adapter.get_info();
@@ -131,7 +138,10 @@ impl Device {
             queue,
             name: format!("{} ({:?})", info.name, info.backend),
             // Drivers misbehave near i32::MAX bytes.
-            max_binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(1 << 30),
+            max_binding: limits
+                .max_storage_buffer_binding_size
+                .min(limits.max_buffer_size)
+                .min(1 << 30),
             max_groups: limits.max_compute_workgroups_per_dimension,
             trouble,
         })
@@ -140,7 +150,11 @@ impl Device {
     /// The first error since the last look.
     pub(super) fn check(&self) -> Result<()> {
         match self.trouble.lock().map(|mut t| t.take()) {
-            Ok(Some(what)) => bail!("{}: {}", self.name, what.lines().next().unwrap_or("an error without a text")),
+            Ok(Some(what)) => bail!(
+                "{}: {}",
+                self.name,
+                what.lines().next().unwrap_or("an error without a text")
+            ),
             _ => Ok(()),
         }
     }
@@ -150,9 +164,14 @@ impl Device {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let value = f();
-        let errors = [pollster::block_on(validation.pop()), pollster::block_on(memory.pop())];
+        let errors = [
+            pollster::block_on(validation.pop()),
+            pollster::block_on(memory.pop()),
+        ];
         match errors.into_iter().flatten().next() {
-            Some(wgpu::Error::OutOfMemory { .. }) => bail!("{} is out of memory while {what}", self.name),
+            Some(wgpu::Error::OutOfMemory { .. }) => {
+                bail!("{} is out of memory while {what}", self.name)
+            }
             Some(e) => bail!("{} failed while {what}: {e}", self.name),
             None => Ok(value),
         }
@@ -160,7 +179,10 @@ impl Device {
 
     /// Waits for a submit.
     pub(super) fn wait(&self, index: wgpu::SubmissionIndex, patience: Duration) -> Result<()> {
-        let poll = wgpu::PollType::Wait { submission_index: Some(index), timeout: Some(patience) };
+        let poll = wgpu::PollType::Wait {
+            submission_index: Some(index),
+            timeout: Some(patience),
+        };
         if let Err(e) = self.device.poll(poll) {
             bail!("{} does not answer: {e}", self.name);
         }
@@ -178,7 +200,9 @@ impl Device {
                 mapped_at_creation: false,
             })
         })?;
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None });
+        let mut encoder = self
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None });
         encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
         let index = self.queue.submit([encoder.finish()]);
         let (send, receive) = std::sync::mpsc::channel();
@@ -191,7 +215,9 @@ impl Device {
             Ok(Ok(())) => {}
             _ => bail!("{} did not give the picture back", self.name),
         }
-        let view = staging.get_mapped_range(..).map_err(|e| anyhow!("{}: {e}", self.name))?;
+        let view = staging
+            .get_mapped_range(..)
+            .map_err(|e| anyhow!("{}: {e}", self.name))?;
         Ok(view.to_vec())
     }
 }

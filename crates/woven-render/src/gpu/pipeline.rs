@@ -7,7 +7,9 @@ use crate::rng::SOBOL;
 pub fn source() -> String {
     let mut sobol = String::from("fn sobol(i: u32) -> vec4<u32> {\n    var p = vec4<u32>(0u);\n");
     for (bit, [a, b, c, d]) in SOBOL.iter().enumerate() {
-        sobol.push_str(&format!("    p ^= vec4<u32>({a}u, {b}u, {c}u, {d}u) * ((i >> {bit}u) & 1u);\n"));
+        sobol.push_str(&format!(
+            "    p ^= vec4<u32>({a}u, {b}u, {c}u, {d}u) * ((i >> {bit}u) & 1u);\n"
+        ));
     }
     sobol.push_str("    return p;\n}\n");
     [

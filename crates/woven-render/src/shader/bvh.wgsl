@@ -152,10 +152,11 @@ fn transmittance(ray: Ray, tmax: f32, rng: ptr<function, Rng>) -> f32 {
         }
         let packet = child & ~LEAF;
         let four = triangles(packet, ray, 0.0, tmax);
-        for (var lane = 0u; lane < 4u; lane++) {
-            if (!four.hit[lane]) {
-                continue;
-            }
+        // One copy of the code for the four lanes: what is asked of a sheet is long.
+        var mask = dot(select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), four.hit), vec4<u32>(1u));
+        while (mask != 0u) {
+            let lane = firstTrailingBit(mask);
+            mask &= mask - 1u;
             var gap = packets[packet].gap[lane];
             if (gap < 0.0) {
                 gap = gap_at(packet * 4u + lane, four.u[lane], four.v[lane], ray.d);

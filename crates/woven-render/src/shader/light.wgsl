@@ -170,49 +170,54 @@ fn power_share(i: u32) -> f32 {
     return lights[i].cumulative - before;
 }
 
-fn light_towards(at: Place, i: u32, share: f32, u: f32, v: f32) -> LightSample {
+fn light_towards(at: Place, i: u32, share: f32, u1: f32, v1: f32) -> LightSample {
     let n = lights[i].n;
     let layer = lights[i].layer;
     let kind = lights[i].kind;
-    if (kind == RECT || kind == TRIANGLE) {
+    if (kind == RECT || kind == TRIANGLE || kind == SKY) {
         let triangle = kind == TRIANGLE;
-        var a = u;
-        var b = v;
+        var a = u1;
+        var b = v1;
         if (triangle && a + b > 1.0) {
             a = 1.0 - a;
             b = 1.0 - b;
         }
-        var t: Towards;
-        if (triangle) {
-            t = triangle_sample(i, at.p, a, b);
-        } else {
-            t = rect_sample(i, at.p, a, b);
+        // The sky is sampled through a window's rectangle, or by its picture.
+        var row = i;
+        if (kind == SKY) {
+            let w = choose_window(at, u1);
+            row = w.row;
+            a = w.u;
         }
-        let two = (materials[shades[lights[i].place].material].flags & DOUBLE_SIDED) != 0u;
-        if (t.pdf <= 0.0 || (!two && dot(t.d, n) >= 0.0)) {
-            return no_light();
+        var t: Towards;
+        if (row == NONE) {
+            t = Towards(picture_sample(a, b), 1e9, 1.0);
+        } else {
+            t = rect_sample(row, at.p, a, b, triangle);
         }
         var radiance = lights[i].radiance;
-        if (triangle) {
-            radiance = emission_at(lights[i].place, a, b);
+        if (kind == SKY) {
+            t.distance = 1e9;
+            radiance = sky(t.d);
+        } else {
+            let two = (materials[shades[lights[i].place].material].flags & DOUBLE_SIDED) != 0u;
+            if (!two && dot(t.d, n) >= 0.0) {
+                return no_light();
+            }
+            if (triangle) {
+                radiance = emission_at(lights[i].place, a, b);
+            }
         }
-        return LightSample(t.d, t.distance, radiance, share * t.pdf, layer, true, soft(i));
+        let pdf = share * direction_density(at, i, t.d, t.distance);
+        return LightSample(t.d, t.distance, radiance, pdf, layer, true, soft(i));
     }
     if (kind == SUN) {
-        let sc = sincos(TAU * v);
-        let radius = lights[i].u.y * sqrt(u);
+        let sc = sincos(TAU * v1);
+        let radius = lights[i].u.y * sqrt(u1);
         let x = any_tangent(n);
         let y = cross(n, x);
         let wi = unit(n + (x * sc.y + y * sc.x) * radius);
         return LightSample(wi, 1e9, lights[i].radiance, share, layer, false, false);
-    }
-    if (kind == SKY) {
-        let wi = sky_sample(at, u, v);
-        let pdf = sky_density(at, wi);
-        if (pdf <= 0.0) {
-            return no_light();
-        }
-        return LightSample(wi, 1e9, sky(wi), share * pdf, layer, true, false);
     }
     let to = lights[i].p - at.p;
     let distance = max(sqrt(length2(to)), 1e-6);
@@ -238,14 +243,46 @@ fn light_density(at: Place, i: u32, wi: vec3<f32>, distance: f32) -> f32 {
     if (share <= 0.0) {
         return 0.0;
     }
+    return share * direction_density(at, i, wi, distance);
+}
+
+// Density per solid angle with which light i is sampled in direction wi: through its own rectangle or triangle, or for
+// the sky through the windows and by the picture.
+fn direction_density(at: Place, i: u32, wi: vec3<f32>, distance: f32) -> f32 {
     let kind = lights[i].kind;
-    if (kind == RECT || kind == TRIANGLE) {
-        return share * rect_density(i, at.p, wi, distance, kind == TRIANGLE);
+    if (kind != RECT && kind != TRIANGLE && kind != SKY) {
+        return 0.0;
     }
+    var first = i;
+    var count = 1u;
+    var all = 1.0;
+    var picture = 0.0;
     if (kind == SKY) {
-        return share * sky_density(at, wi);
+        first = frame.globals.lights;
+        count = select(0u, frame.globals.portals, at.inside);
+        picture = 1.0;
+        if (at.inside) {
+            picture = 1.0 - frame.globals.portal_share;
+            all = windows(at.p);
+        }
     }
-    return 0.0;
+    var pdf = 0.0;
+    for (var k = 0u; k < count; k++) {
+        let row = first + k;
+        var t = distance;
+        var part = 1.0;
+        if (kind == SKY) {
+            t = crossing(row, at.p, wi);
+            part = frame.globals.portal_share * window(row, at.p) / all;
+        }
+        if (t > 0.0) {
+            pdf += part * rect_density(row, at.p, wi, t, kind == TRIANGLE);
+        }
+    }
+    if (picture > 0.0) {
+        pdf += picture * picture_density(wi);
+    }
+    return pdf;
 }
 
 fn sky_uv(d: vec3<f32>) -> vec2<f32> {
@@ -280,12 +317,17 @@ fn sky(d: vec3<f32>) -> vec3<f32> {
     return (top + (low - top) * (y - y0)) * frame.globals.sky_scale.xyz;
 }
 
-fn sky_sample(at: Place, u1: f32, v: f32) -> vec3<f32> {
+// A row of windows and the number that is left, or no window: the picture is to be sampled.
+struct Window {
+    row: u32,
+    u: f32,
+}
+
+fn choose_window(at: Place, u1: f32) -> Window {
     let first = frame.globals.lights;
     let portal_share = frame.globals.portal_share;
-    var u = u1;
-    if (at.inside && u < portal_share) {
-        u = min(u / portal_share, 0.99999994);
+    if (at.inside && u1 < portal_share) {
+        let u = min(u1 / portal_share, 0.99999994);
         var rest = u * windows(at.p);
         var chosen = first;
         var w = 1.0;
@@ -297,34 +339,21 @@ fn sky_sample(at: Place, u1: f32, v: f32) -> vec3<f32> {
             }
             rest -= w;
         }
-        return rect_sample(chosen, at.p, clamp(rest / w, 0.0, 1.0), v).d;
+        return Window(chosen, clamp(rest / w, 0.0, 1.0));
     }
     if (at.inside) {
-        u = min((u - portal_share) / max(1.0 - portal_share, 1e-6), 0.99999994);
+        return Window(NONE, min((u1 - portal_share) / max(1.0 - portal_share, 1e-6), 0.99999994));
     }
-    return picture_sample(u, v);
+    return Window(NONE, u1);
 }
 
-fn find_column(first: u32, count: u32, u: f32) -> u32 {
+// First entry of `count` from `first` whose distribution, number `k` of it, exceeds u.
+fn find(first: u32, count: u32, k: u32, u: f32) -> u32 {
     var lo = 0u;
     var hi = count - 1u;
     while (lo < hi) {
         let middle = (lo + hi) / 2u;
-        if (skies[first + middle].w > u) {
-            hi = middle;
-        } else {
-            lo = middle + 1u;
-        }
-    }
-    return lo;
-}
-
-fn find_row(first: u32, count: u32, u: f32) -> u32 {
-    var lo = 0u;
-    var hi = count - 1u;
-    while (lo < hi) {
-        let middle = (lo + hi) / 2u;
-        if (skies[first + middle].x > u) {
+        if (skies[first + middle][k] > u) {
             hi = middle;
         } else {
             lo = middle + 1u;
@@ -350,8 +379,8 @@ fn column_before(x: u32, y: u32) -> f32 {
 fn picture_sample(u: f32, v: f32) -> vec3<f32> {
     let w = frame.globals.sky_width;
     let h = frame.globals.sky_height;
-    let y = find_row(w * h, h, v);
-    let x = find_column(y * w, w, u);
+    let y = find(w * h, h, 0u, v);
+    let x = find(y * w, w, 3u, u);
     let by = row_before(y);
     let fy = clamp((v - by) / (skies[w * h + y].x - by), 0.0, 1.0);
     let bx = column_before(x, y);
@@ -365,32 +394,14 @@ fn picture_sample(u: f32, v: f32) -> vec3<f32> {
     return unit(vec3<f32>(lx * c + lz * s, theta.y, lz * c - lx * s));
 }
 
-fn sky_density(at: Place, d: vec3<f32>) -> f32 {
-    let first = frame.globals.lights;
-    let portal_share = frame.globals.portal_share;
-    var pdf = 0.0;
-    var picture = 1.0;
-    if (at.inside) {
-        picture = 1.0 - portal_share;
-        let all = windows(at.p);
-        for (var i = 0u; i < frame.globals.portals; i++) {
-            let r = first + i;
-            let t = crossing(r, at.p, d);
-            if (t > 0.0) {
-                pdf += portal_share * window(r, at.p) / all * rect_density(r, at.p, d, t, false);
-            }
-        }
-    }
-    if (picture > 0.0) {
-        let w = frame.globals.sky_width;
-        let h = frame.globals.sky_height;
-        let uv = sky_uv(d);
-        let x = min(u32(max(uv.x * f32(w), 0.0)), w - 1u);
-        let y = min(u32(max(uv.y * f32(h), 0.0)), h - 1u);
-        let row = skies[w * h + y].x - row_before(y);
-        let column = skies[y * w + x].w - column_before(x, y);
-        let sin_theta = sqrt(max(1.0 - d.y * d.y, 1e-8));
-        pdf += picture * row * column * f32(w * h) / (2.0 * PI * PI * sin_theta);
-    }
-    return pdf;
+fn picture_density(d: vec3<f32>) -> f32 {
+    let w = frame.globals.sky_width;
+    let h = frame.globals.sky_height;
+    let uv = sky_uv(d);
+    let x = min(u32(max(uv.x * f32(w), 0.0)), w - 1u);
+    let y = min(u32(max(uv.y * f32(h), 0.0)), h - 1u);
+    let row = skies[w * h + y].x - row_before(y);
+    let column = skies[y * w + x].w - column_before(x, y);
+    let sin_theta = sqrt(max(1.0 - d.y * d.y, 1e-8));
+    return row * column * f32(w * h) / (2.0 * PI * PI * sin_theta);
 }

@@ -2,6 +2,7 @@
 
 const CROSSINGS: u32 = 64u;
 const BOUNCES: u32 = 65u;
+const ROULETTE: f32 = 3.0;
 
 struct Vertex {
     s: Surface,
@@ -51,9 +52,10 @@ fn direct(m: u32, s: Surface, at: Place, wo: vec3<f32>, u: vec4<f32>, rng: ptr<f
         return Direct(0u, vec3<f32>(0.0));
     }
     let wi = local(s, l.wi);
-    var value = evaluate(m, s, wi, wo) * l.radiance * (abs(wi.z) / l.pdf);
+    let b = scattering(m, s, wo, wi, false, vec3<f32>(0.0));
+    var value = b.f * l.radiance * (abs(wi.z) / l.pdf);
     if (l.meets && (l.sampled_by_all || shares(m))) {
-        value *= heuristic(l.pdf, density_of(m, wo, wi));
+        value *= heuristic(l.pdf, b.pdf);
     }
     if (max3(value) <= 0.0) {
         return Direct(0u, vec3<f32>(0.0));
@@ -84,162 +86,178 @@ fn reflectance(m: u32, s: Surface) -> vec3<f32> {
     return sum * s.tint;
 }
 
+// Sample `index` of pixel (x, y). One loop for camera and path: each heavy function is called at one place, because
+// shader compilers copy functions to where they are called.
 fn take(x: u32, y: u32, index: u32) -> Taken {
     var out: Taken;
     var rng = rng_new(x, y, index, frame.seed);
-    let ray = camera_ray(x, y, rng_set(&rng, 0u));
-    var passed = 1.0;
+    var ray = camera_ray(x, y, rng_set(&rng, 0u));
     var tmin = 0.0;
+    // Straight from the eye: `carry` is the product of the gaps so far, `bounce` counts crossings.
+    var camera = true;
+    var carry = vec3<f32>(1.0);
+    var bounce = 0u;
+    // What the camera ray's crossings leave for the indirect part.
     var found = false;
     var chosen: Vertex;
     var chosen_weight = 1.0;
     var all_weights = 0.0;
     var pick = rng_coin(&rng);
-    for (var number = 0u; number < CROSSINGS; number++) {
+    // The vertex that the path left last, and the density with which it did.
+    var v: Vertex;
+    var pdf = 0.0;
+    loop {
         let hit = nearest(ray, tmin, FAR);
-        if (hit.place == EMPTY) {
-            add_light(&out, frame.globals.sky_layer, sky(ray.d) * passed);
-            for (var i = 0u; i < frame.globals.lights; i++) {
-                if (lights[i].kind == SUN && lights[i].u.y > 1e-4 && dot(ray.d, lights[i].n) > lights[i].u.x) {
-                    add_light(&out, lights[i].layer, lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
+        let miss = hit.place == EMPTY;
+        var s: Surface;
+        var gap = 0.0;
+        var given: vec3<f32>;
+        var layer = frame.globals.sky_layer;
+        var row = frame.globals.sky_light;
+        if (miss) {
+            given = sky(ray.d);
+        } else {
+            s = surface(hit);
+            gap = gap_of(s.material, s, ray.d);
+            // A path goes straight on through gaps, each by a coin.
+            if (!camera && gap > 0.0) {
+                var pass_on = gap >= 1.0;
+                if (!pass_on) {
+                    pass_on = rng_coin(&rng) < gap;
+                }
+                if (pass_on) {
+                    tmin = hit.t * (1.0 + 2e-6) + frame.globals.offset;
+                    continue;
                 }
             }
-            break;
+            given = emission(s.material, s, -ray.d);
+            layer = materials[s.material].layer;
+            row = s.light;
         }
-        let s = surface(hit);
-        let m = s.material;
-        let wo = local(s, -ray.d);
-        let gap = gap_of(m, s, ray.d);
-        add_light(&out, materials[m].layer, emission(m, s, -ray.d) * (passed * (1.0 - gap)));
-        let albedo = materials[m].emission.w * luminance(s.tint);
-        if (number == 0u) {
-            out.normal = towards_eye(s, ray.d);
-            out.depth = hit.t;
+        // What is given off there; scattering shares it with the sampling of lights.
+        if (max3(given) > 0.0) {
+            var share = 1.0;
+            if (camera) {
+                share = 1.0 - gap;
+            } else if (row != NONE) {
+                let met = light_density(v.at, row, ray.d, select(hit.t, 1e9, miss));
+                if (met > 0.0) {
+                    share = 0.0;
+                    if (shares(v.s.material) || (!miss && soft(row))) {
+                        share = heuristic(pdf, met);
+                    }
+                }
+            }
+            add_light(&out, layer, given * carry * share);
         }
-        out.albedo += reflectance(m, s) * (passed * (1.0 - gap));
-        let weight = passed * (1.0 - gap) * albedo;
-        if (weight > 0.0 && frame.depth > 0u) {
-            let at = place_of(m, s, ray.d);
-            let lit = direct(m, s, at, wo, rng_set(&rng, 1u + number), &rng);
-            add_light(&out, lit.layer, lit.value * passed);
-            // Reservoir of one: each crossing is kept in proportion to its weight.
-            all_weights += weight;
-            let keep = weight / all_weights;
-            if (pick < keep) {
-                pick /= keep;
-                found = true;
-                chosen = Vertex(s, at, wo, vec3<f32>(passed));
-                chosen_weight = weight;
-            } else {
-                pick = (pick - keep) / (1.0 - keep);
+        var scatter = false;
+        if (miss) {
+            if (camera) {
+                add_discs(&out, ray.d, carry.x);
+            }
+        } else {
+            if (camera && bounce == 0u) {
+                out.normal = towards_eye(s, ray.d);
+                out.depth = hit.t;
+            }
+            let albedo = materials[s.material].emission.w * luminance(s.tint);
+            let weight = carry.x * (1.0 - gap) * albedo;
+            var lit_here = bounce < frame.depth && materials[s.material].emission.w > 0.0;
+            if (camera) {
+                out.albedo += reflectance(s.material, s) * (carry.x * (1.0 - gap));
+                lit_here = weight > 0.0 && frame.depth > 0u;
+            }
+            if (lit_here) {
+                let at = place_of(s.material, s, ray.d);
+                let wo = local(s, -ray.d);
+                let u = rng_set(&rng, select(BOUNCES + 2u * bounce + 1u, 1u + bounce, camera));
+                if (!camera) {
+                    // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
+                    carry *= 1.0 / max(1.0 - gap, 1e-6);
+                }
+                let lit = direct(s.material, s, at, wo, u, &rng);
+                add_light(&out, lit.layer, lit.value * carry);
+                if (camera) {
+                    // Reservoir of one: each crossing is kept in proportion to its weight.
+                    all_weights += weight;
+                    let keep = weight / all_weights;
+                    if (pick < keep) {
+                        pick /= keep;
+                        found = true;
+                        chosen = Vertex(s, at, wo, carry);
+                        chosen_weight = weight;
+                    } else {
+                        pick = (pick - keep) / (1.0 - keep);
+                    }
+                } else {
+                    v = Vertex(s, at, wo, carry);
+                    scatter = true;
+                }
             }
         }
-        passed *= gap;
-        if (passed <= 0.0) {
+        if (camera) {
+            var passed = select(carry.x * gap, 0.0, miss);
+            if (passed > 0.0) {
+                out.gap = passed;
+                if (passed < FAINT) {
+                    if (rng_coin(&rng) < 0.5) {
+                        out.gap = 0.0;
+                        passed = 0.0;
+                    }
+                    passed *= 2.0;
+                }
+                bounce += 1u;
+                if (passed > 0.0 && bounce < CROSSINGS) {
+                    carry = vec3<f32>(passed);
+                    tmin = hit.t * (1.0 + 2e-6) + frame.globals.offset;
+                    continue;
+                }
+            }
+            // The camera ray has ended; the path begins at the crossing that was kept.
+            camera = false;
+            bounce = 0u;
+            v = chosen;
+            carry = chosen.throughput * (all_weights / chosen_weight);
+            scatter = found;
+        }
+        if (!scatter) {
             break;
         }
-        out.gap = passed;
-        if (passed < FAINT) {
-            if (rng_coin(&rng) < 0.5) {
-                out.gap = 0.0;
+        bounce += 1u;
+        let m = v.s.material;
+        // The last ray could only meet lights that sampling has already counted.
+        if (bounce > frame.depth || (bounce == frame.depth && !shares(m) && frame.globals.soft_lights == 0u)) {
+            break;
+        }
+        let u = rng_set(&rng, BOUNCES + 2u * bounce);
+        let b = scattering(m, v.s, v.wo, vec3<f32>(0.0), true, u.xyz);
+        pdf = b.pdf;
+        if (pdf <= 1e-12) {
+            break;
+        }
+        carry *= b.f * (abs(b.wi.z) / pdf);
+        let q = max3(carry) * ROULETTE;
+        if (q <= 0.0) {
+            break;
+        }
+        if (bounce > 1u && q < 1.0) {
+            if (u.w >= q) {
                 break;
             }
-            passed *= 2.0;
+            carry *= 1.0 / q;
         }
-        tmin = hit.t * (1.0 + 2e-6) + frame.globals.offset;
-    }
-    if (found) {
-        chosen.throughput *= all_weights / chosen_weight;
-        follow(chosen, &rng, &out);
+        let d = world(v.s, b.wi);
+        ray = ray_new(leave(v.s, d), d);
+        tmin = 0.0;
     }
     return out;
 }
 
-fn follow(start: Vertex, rng: ptr<function, Rng>, out: ptr<function, Taken>) {
-    var v = start;
-    for (var bounce = 1u; bounce <= frame.depth; bounce++) {
-        let m = v.s.material;
-        let mixed = shares(m);
-        // The last ray could only meet lights that sampling has already counted.
-        if (bounce == frame.depth && !mixed && frame.globals.soft_lights == 0u) {
-            return;
+fn add_discs(out: ptr<function, Taken>, d: vec3<f32>, passed: f32) {
+    for (var i = 0u; i < frame.globals.lights; i++) {
+        if (lights[i].kind == SUN && lights[i].u.y > 1e-4 && dot(d, lights[i].n) > lights[i].u.x) {
+            add_light(out, lights[i].layer, lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
         }
-        let u = rng_set(rng, BOUNCES + 2u * bounce);
-        let wi = sample_sheet(m, v.wo, u.xyz);
-        let pdf = density_of(m, v.wo, wi);
-        if (pdf <= 1e-12) {
-            return;
-        }
-        v.throughput *= evaluate(m, v.s, wi, v.wo) * (abs(wi.z) / pdf);
-        let q = max3(v.throughput);
-        if (q <= 0.0) {
-            return;
-        }
-        if (bounce > 1u && q < 1.0) {
-            if (u.w >= q) {
-                return;
-            }
-            v.throughput *= 1.0 / q;
-        }
-        let d = world(v.s, wi);
-        let ray = ray_new(leave(v.s, d), d);
-        var tmin = 0.0;
-        var hit: Hit;
-        var s: Surface;
-        // Straight on through gaps, each by a coin.
-        loop {
-            hit = nearest(ray, tmin, FAR);
-            if (hit.place == EMPTY) {
-                let row = frame.globals.sky_light;
-                if (row != NONE) {
-                    let met = light_density(v.at, row, d, 1e9);
-                    var share = 0.0;
-                    if (met <= 0.0) {
-                        share = 1.0;
-                    } else if (mixed) {
-                        share = heuristic(pdf, met);
-                    }
-                    add_light(out, frame.globals.sky_layer, sky(d) * v.throughput * share);
-                }
-                return;
-            }
-            s = surface(hit);
-            let gap = gap_of(s.material, s, d);
-            if (gap <= 0.0) {
-                break;
-            }
-            if (gap < 1.0 && rng_coin(rng) >= gap) {
-                break;
-            }
-            tmin = hit.t * (1.0 + 2e-6) + frame.globals.offset;
-        }
-        let n = s.material;
-        let emitted = emission(n, s, -d);
-        if (max3(emitted) > 0.0) {
-            var share = 1.0;
-            if (s.light != NONE) {
-                let met = light_density(v.at, s.light, d, hit.t);
-                if (met > 0.0) {
-                    share = 0.0;
-                    if (mixed || soft(s.light)) {
-                        share = heuristic(pdf, met);
-                    }
-                }
-            }
-            add_light(out, materials[n].layer, emitted * v.throughput * share);
-        }
-        if (bounce == frame.depth || materials[n].emission.w <= 0.0) {
-            return;
-        }
-        let at = place_of(n, s, d);
-        let wo = local(s, -d);
-        let w = rng_set(rng, BOUNCES + 2u * bounce + 1u);
-        // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
-        let gap = gap_of(n, s, d);
-        v.throughput *= 1.0 / max(1.0 - gap, 1e-6);
-        let lit = direct(n, s, at, wo, w, rng);
-        add_light(out, lit.layer, lit.value * v.throughput);
-        v = Vertex(s, at, wo, v.throughput);
     }
 }
 

@@ -63,8 +63,8 @@ fn by_area(r: u32, to: vec3<f32>) -> Towards {
     return Towards(d, distance, 0.0);
 }
 
-fn rect_sample(r: u32, p: vec3<f32>, u: f32, v: f32) -> Towards {
-    if (lights[r].area > 0.0) {
+fn rect_sample(r: u32, p: vec3<f32>, u: f32, v: f32, triangle: bool) -> Towards {
+    if (lights[r].area > 0.0 && !triangle) {
         let s = spherical(r, p);
         if (s.solid_angle > SMALL) {
             let sc = sincos(u * s.solid_angle + s.k);
@@ -81,10 +81,6 @@ fn rect_sample(r: u32, p: vec3<f32>, u: f32, v: f32) -> Towards {
             return Towards(to * (1.0 / distance), distance, 1.0 / s.solid_angle);
         }
     }
-    return by_area(r, lights[r].p + lights[r].u * u + lights[r].v * v - p);
-}
-
-fn triangle_sample(r: u32, p: vec3<f32>, u: f32, v: f32) -> Towards {
     return by_area(r, lights[r].p + lights[r].u * u + lights[r].v * v - p);
 }
 

@@ -1,6 +1,8 @@
 // The sheet at a point: frame, textures, gap, scattering; the pair of cpu/surface.rs.
 
 const TEXTURE_ROW: u32 = 12u;
+// Words of the table of sRGB.
+const SRGB: u32 = 256u;
 
 struct Surface {
     p: vec3<f32>,
@@ -100,11 +102,16 @@ fn surface(hit: Hit) -> Surface {
     return Surface(p, ng, f[0], f[1], f[2], uv, material, shades[place].light, tint, alpha);
 }
 
+fn open_along(m: u32, w: vec3<f32>) -> f32 {
+    let shape = materials[m].shape[0];
+    return openness(shape.x, shape.y, shape.z, w);
+}
+
 fn gap_of(m: u32, s: Surface, d: vec3<f32>) -> f32 {
     if (materials[m].gap >= 0.0) {
         return materials[m].gap;
     }
-    let open = openness(materials[m].shape[0], materials[m].shape[1], materials[m].shape[2], local(s, d));
+    let open = open_along(m, local(s, d));
     return clamp(1.0 - s.alpha * (1.0 - open), 0.0, 1.0);
 }
 
@@ -123,7 +130,7 @@ fn gap_at(place: u32, u: f32, v: f32, d: vec3<f32>) -> f32 {
         let f = shading_frame(place, u, v, ng);
         w = vec3<f32>(dot(d, f[0]), dot(d, f[1]), dot(d, f[2]));
     }
-    let open = openness(materials[m].shape[0], materials[m].shape[1], materials[m].shape[2], w);
+    let open = open_along(m, w);
     return clamp(1.0 - alpha * (1.0 - open), 0.0, 1.0);
 }
 
@@ -149,53 +156,41 @@ fn wrapped(i: i32, n: i32, mode: u32) -> i32 {
     return clamp(i, 0, n - 1);
 }
 
-fn srgb1(x: f32) -> f32 {
-    if (x <= 0.04045) {
-        return x * (1.0 / 12.92);
+// The first words of the buffer: sRGB decoded, for 0..255.
+fn decode(word: u32, srgb: bool) -> vec4<f32> {
+    let k = vec4<u32>(word & 255u, (word >> 8u) & 255u, (word >> 16u) & 255u, word >> 24u);
+    var c = vec4<f32>(k) * (1.0 / 255.0);
+    if (srgb) {
+        c = vec4<f32>(bitcast<f32>(texels[k.x]), bitcast<f32>(texels[k.y]), bitcast<f32>(texels[k.z]), c.w);
     }
-    return pow((x + 0.055) * (1.0 / 1.055), 2.4);
+    return c;
 }
 
-fn decode(word: u32, flags: u32) -> vec4<f32> {
-    let c = vec4<f32>(
-        f32(word & 255u),
-        f32((word >> 8u) & 255u),
-        f32((word >> 16u) & 255u),
-        f32(word >> 24u),
-    ) * (1.0 / 255.0);
-    if ((flags & 16u) == 0u) {
-        return c;
-    }
-    return vec4<f32>(srgb1(c.x), srgb1(c.y), srgb1(c.z), c.w);
-}
-
-fn texel_at(row: u32, x: i32, y: i32) -> vec4<f32> {
+fn texel(number: u32, uv: vec2<f32>) -> vec4<f32> {
+    let row = SRGB + number * TEXTURE_ROW;
+    let a = vec3<f32>(bitcast<f32>(texels[row]), bitcast<f32>(texels[row + 1u]), bitcast<f32>(texels[row + 2u]));
+    let b = vec3<f32>(bitcast<f32>(texels[row + 4u]), bitcast<f32>(texels[row + 5u]), bitcast<f32>(texels[row + 6u]));
     let first = texels[row + 8u];
     let width = i32(texels[row + 9u]);
     let height = i32(texels[row + 10u]);
     let flags = texels[row + 11u];
-    let i = wrapped(x, width, flags & 3u);
-    let j = wrapped(y, height, (flags >> 2u) & 3u);
-    return decode(texels[first + u32(j * width + i)], flags);
-}
-
-fn texel(number: u32, uv: vec2<f32>) -> vec4<f32> {
-    let row = number * TEXTURE_ROW;
-    let a = vec3<f32>(bitcast<f32>(texels[row]), bitcast<f32>(texels[row + 1u]), bitcast<f32>(texels[row + 2u]));
-    let b = vec3<f32>(bitcast<f32>(texels[row + 4u]), bitcast<f32>(texels[row + 5u]), bitcast<f32>(texels[row + 6u]));
-    let x = (a.x * uv.x + a.y * uv.y + a.z) * f32(texels[row + 9u]) - 0.5;
-    let y = (b.x * uv.x + b.y * uv.y + b.z) * f32(texels[row + 10u]) - 0.5;
+    let x = (a.x * uv.x + a.y * uv.y + a.z) * f32(width) - 0.5;
+    let y = (b.x * uv.x + b.y * uv.y + b.z) * f32(height) - 0.5;
     let x0 = floor(x);
     let y0 = floor(y);
-    let i = i32(x0);
-    let j = i32(y0);
-    let c00 = texel_at(row, i, j);
-    let c10 = texel_at(row, i + 1, j);
-    let c01 = texel_at(row, i, j + 1);
-    let c11 = texel_at(row, i + 1, j + 1);
-    let top = c00 + (c10 - c00) * (x - x0);
-    let low = c01 + (c11 - c01) * (x - x0);
-    return top + (low - top) * (y - y0);
+    var rows: array<vec4<f32>, 2>;
+    // A bound that the compiler does not know keeps the four taps one piece of code.
+    for (var tap = 0u; tap < frame.globals.taps; tap++) {
+        let i = wrapped(i32(x0) + i32(tap & 1u), width, flags & 3u);
+        let j = wrapped(i32(y0) + i32(tap >> 1u), height, (flags >> 2u) & 3u);
+        let c = decode(texels[first + u32(j * width + i)], (flags & 16u) != 0u);
+        if ((tap & 1u) == 0u) {
+            rows[tap >> 1u] = c;
+        } else {
+            rows[tap >> 1u] += (c - rows[tap >> 1u]) * (x - x0);
+        }
+    }
+    return rows[0] + (rows[1] - rows[0]) * (y - y0);
 }
 
 fn emission(m: u32, s: Surface, wo: vec3<f32>) -> vec3<f32> {
@@ -219,31 +214,47 @@ fn emission_at(place: u32, u: f32, v: f32) -> vec3<f32> {
     return e * texel(materials[m].emission_texture, uv_at(place, u, v)).xyz;
 }
 
-fn evaluate(m: u32, s: Surface, wi: vec3<f32>, wo: vec3<f32>) -> vec3<f32> {
+// A direction, f for it, its density.
+struct Scattered {
+    wi: vec3<f32>,
+    f: vec3<f32>,
+    pdf: f32,
+}
+
+// Value and density of wi, or of a direction drawn by u if `draw`: one function, so that the material's numbers are
+// read once.
+fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u: vec3<f32>) -> Scattered {
+    let flags = materials[m].flags;
+    let w0 = materials[m].weights[0];
     let scale = s.tint * s.alpha;
-    if ((materials[m].flags & (MATT | EVEN)) == (MATT | EVEN)) {
-        let j = select(2u, 0u, wi.z * wo.z < 0.0);
-        return materials[m].linear[j].xyz * scale * (materials[m].cover * FRAC_1_PI);
-    }
-    let b = sheet_basis(materials[m].shape, wi, wo);
-    return (materials[m].linear[0].xyz * b[0] + materials[m].linear[1].xyz * b[1]
-        + materials[m].linear[2].xyz * b[2] + materials[m].linear[3].xyz * b[3]) * scale;
-}
-
-fn density_of(m: u32, wo: vec3<f32>, wi: vec3<f32>) -> f32 {
-    if ((materials[m].flags & MATT) != 0u) {
-        return materials[m].weights[select(2u, 0u, wi.z * wo.z < 0.0)] * abs(wi.z) * FRAC_1_PI;
-    }
-    return sheet_pdf(materials[m].shape, materials[m].weights, wo, wi);
-}
-
-fn sample_sheet(m: u32, wo: vec3<f32>, u: vec3<f32>) -> vec3<f32> {
-    if ((materials[m].flags & MATT) != 0u) {
+    var wi = known;
+    if ((flags & MATT) != 0u && draw) {
         let r = sqrt(u.x);
         let sc = sincos_turn(u.y);
         let z = sqrt(max(1.0 - u.x, 0.0));
-        let through = u.z < materials[m].weights[0];
-        return vec3<f32>(r * sc.y, r * sc.x, select(z, -z, (wo.z > 0.0) == through));
+        let through = u.z < w0.x;
+        wi = vec3<f32>(r * sc.y, r * sc.x, select(z, -z, (wo.z > 0.0) == through));
     }
-    return sheet_sample(materials[m].shape, materials[m].weights, wo, u);
+    var pdf = select(w0.z, w0.x, wi.z * wo.z < 0.0) * abs(wi.z) * FRAC_1_PI;
+    if ((flags & (MATT | EVEN)) == (MATT | EVEN)) {
+        let k = materials[m].linear[select(2u, 0u, wi.z * wo.z < 0.0)].xyz;
+        return Scattered(wi, k * scale * (materials[m].cover * FRAC_1_PI), pdf);
+    }
+    let a = materials[m].shape[0];
+    let b = materials[m].shape[1];
+    let c = materials[m].shape[2];
+    let d = materials[m].shape[3];
+    let w1 = materials[m].weights[1];
+    let shape = array<f32, 16>(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w);
+    let weights = array<f32, 8>(w0.x, w0.y, w0.z, w0.w, w1.x, w1.y, w1.z, w1.w);
+    if ((flags & MATT) == 0u) {
+        if (draw) {
+            wi = sheet_sample(shape, weights, wo, u);
+        }
+        pdf = sheet_pdf(shape, weights, wo, wi);
+    }
+    let basis = sheet_basis(shape, wi, wo);
+    let f = materials[m].linear[0].xyz * basis[0] + materials[m].linear[1].xyz * basis[1]
+        + materials[m].linear[2].xyz * basis[2] + materials[m].linear[3].xyz * basis[3];
+    return Scattered(wi, f * scale, pdf);
 }

@@ -54,8 +54,9 @@ struct Shade {
 
 struct MaterialRow {
     linear: array<vec4<f32>, 8>,
-    shape: array<f32, 16>,
-    weights: array<f32, 8>,
+    // 16 and 8 numbers.
+    shape: array<vec4<f32>, 4>,
+    weights: array<vec4<f32>, 2>,
     emission: vec4<f32>,
     flags: u32,
     layer: u32,
@@ -92,7 +93,7 @@ struct Globals {
     sky_layer: u32,
     soft_lights: u32,
     offset: f32,
-    pad: u32,
+    taps: u32,
 }
 
 struct Frame {
@@ -127,7 +128,7 @@ struct PixelSum {
 @group(0) @binding(2) var<storage, read> packets: array<Packet>;
 @group(0) @binding(3) var<storage, read> shades: array<Shade>;
 @group(0) @binding(4) var<storage, read> materials: array<MaterialRow>;
-// Rows of textures, TEXTURE_ROW words each, then the texels.
+// sRGB decoded, SRGB words; rows of textures, TEXTURE_ROW words each; the texels.
 @group(0) @binding(5) var<storage, read> texels: array<u32>;
 @group(0) @binding(6) var<storage, read> lights: array<LightRow>;
 @group(0) @binding(7) var<storage, read> skies: array<vec4<f32>>;

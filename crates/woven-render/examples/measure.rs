@@ -1,0 +1,103 @@
+//! How fast and how noisy the CPU path is on a curtain in a window: million samples per CPU-second, and
+//! relMSE × CPU-seconds from two seeds, for direct light and for everything. Prints one line each.
+//!
+//! `cargo run --release -p woven-render --example measure -- SCENE.glb [WIDTHxHEIGHT] [SPP] [OUT.png]`
+
+use anyhow::{Context, Result};
+use std::path::Path;
+use std::time::Instant;
+use woven_render::film::Curve;
+use woven_render::render::{Backend, Integrator, Settings, render};
+use woven_render::scene::Scene;
+
+/// CPU seconds of this process, all threads.
+fn cpu_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields: Vec<&str> = stat
+        .rsplit(')')
+        .next()
+        .unwrap_or("")
+        .split_whitespace()
+        .collect();
+    let ticks = |i: usize| {
+        fields
+            .get(i)
+            .and_then(|f| f.parse::<f64>().ok())
+            .unwrap_or(0.0)
+    };
+    (ticks(11) + ticks(12)) / 100.0
+}
+
+fn load(path: &Path) -> Result<Scene> {
+    let loaded =
+        woven_render::scene::gltf::load(path, &woven_render::scene::gltf::Options::default())?;
+    Ok(loaded.scene)
+}
+
+fn main() -> Result<()> {
+    let mut args = std::env::args().skip(1);
+    let scene = load(Path::new(&args.next().context(
+        "name a scene: measure SCENE.glb [WIDTHxHEIGHT] [SPP] [OUT.png]",
+    )?))?;
+    let size = args.next().unwrap_or_else(|| "320x240".into());
+    let (width, height) = size
+        .split_once('x')
+        .context("the size is written WIDTHxHEIGHT")?;
+    let spp = args.next().map_or(Ok(16), |s| s.parse())?;
+    let settings = Settings {
+        width: width.parse()?,
+        height: height.parse()?,
+        spp,
+        depth: 7,
+        ..Settings::default()
+    };
+    let out = args.next();
+    for (name, integrator) in [
+        ("direct", Integrator::Direct),
+        ("everything", Integrator::Path),
+    ] {
+        let (began, wall) = (cpu_seconds(), Instant::now());
+        let first = render(
+            &scene,
+            &Settings {
+                integrator,
+                ..settings
+            },
+            Backend::Cpu,
+            &mut (),
+        )?;
+        let (cpu, wall) = (cpu_seconds() - began, wall.elapsed().as_secs_f64());
+        let second = render(
+            &scene,
+            &Settings {
+                integrator,
+                seed: 1,
+                ..settings
+            },
+            Backend::Cpu,
+            &mut (),
+        )?;
+        let (a, b) = (
+            first.beauty().unwrap_or(&[]),
+            second.beauty().unwrap_or(&[]),
+        );
+        let mut noise = 0.0;
+        let mut mean = 0.0;
+        for (p, q) in a.iter().flatten().zip(b.iter().flatten()) {
+            let (p, q) = (f64::from(*p), f64::from(*q));
+            let m = 0.5 * (p + q);
+            noise += (p - q) * (p - q) / 2.0 / (m * m + 0.01) / (a.len() * 3) as f64;
+            mean += m / (a.len() * 3) as f64;
+        }
+        let samples = f64::from(settings.width * settings.height * spp) / 1e6;
+        println!(
+            "{name}: {size}, {spp} spp, {wall:.2} s, {cpu:.2} CPU-s, {:.3} M samples per CPU-s, mean {mean:.6}, relMSE {noise:.6}, relMSE x CPU-s {:.5}",
+            samples / cpu,
+            noise * cpu
+        );
+        if let Some(path) = &out {
+            first.write_png(Path::new(path), Curve::default(), scene.camera.exposure)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,235 @@
+//! CPU and GPU make the same picture from the same random numbers.
+//!
+//! Seen to fail: with `gap_at` in shader/surface.wgsl returning 0, and with `product *= gap` in shader/bvh.wgsl left
+//! out, every test below is red.
+
+mod common;
+
+use common::{backends, curtain_room, furnace, mean, picture};
+use glam::Vec3;
+use woven_bsdf::model::Model;
+use woven_render::compare::Picture;
+use woven_render::film::Film;
+use woven_render::render::{Backend, Integrator, Settings};
+use woven_render::scene::{
+    Environment, LAYER_SKY, LAYER_SUN, Light, Material, Scene, Texture, TextureUse, Wrap,
+};
+
+/// A sheet with all its parts: weave, forward lobe, reflection.
+fn lace() -> Material {
+    let mut s = [0.0; 16];
+    s[..8].copy_from_slice(&[0.5, 0.42, 0.7, 0.22, 0.15, 0.4, 0.3, 0.04]);
+    woven_bsdf::sheet::Sheet::derive(&mut s);
+    let mut m = Material::diffuse_sheet("lace", [0.45, 0.42, 0.36], [0.3, 0.27, 0.2], 0.0);
+    m.shape = s.map(|x: f64| x as f32);
+    m.linear[1] = [0.2, 0.2, 0.18];
+    m.linear[3] = [0.3; 3];
+    m
+}
+
+fn settings(spp: u32) -> Settings {
+    Settings {
+        width: 48,
+        height: 36,
+        spp,
+        seed: 3,
+        ..Settings::default()
+    }
+}
+
+/// Share of pixels within `limit` of each other, relative to the brighter plus a hundredth.
+fn share_within(a: &Film, b: &Film, limit: f32) -> f64 {
+    let (a, b) = (
+        a.beauty().expect("a picture"),
+        b.beauty().expect("a picture"),
+    );
+    let close = |(p, q): (&[f32; 3], &[f32; 3])| {
+        (0..3).all(|c| (p[c] - q[c]).abs() <= limit * (p[c].max(q[c]) + 0.01))
+    };
+    a.iter().zip(b).filter(|&(p, q)| close((p, q))).count() as f64 / a.len() as f64
+}
+
+fn as_picture(film: &Film) -> Picture<'_> {
+    Picture {
+        width: film.width,
+        height: film.height,
+        pixels: film.beauty().expect("a picture"),
+    }
+}
+
+fn compare(name: &str, scene: &Scene, settings: &Settings, pixels: f64, means: f64) {
+    if !backends().contains(&Backend::Gpu) {
+        return;
+    }
+    let cpu = picture(scene, settings, Backend::Cpu);
+    let gpu = picture(scene, settings, Backend::Gpu);
+    let (a, b) = (as_picture(&cpu), as_picture(&gpu));
+    let flip = woven_render::compare::compare(a, b, true)
+        .unwrap_or_else(|e| panic!("{e:#}"))
+        .report
+        .flip;
+    let (mc, mg) = (mean(&cpu), mean(&gpu));
+    let worst = (0..3)
+        .map(|c| (mc[c] / mg[c] - 1.0).abs())
+        .fold(0.0, f64::max);
+    let share = share_within(&cpu, &gpu, 1e-3);
+    eprintln!(
+        "{name}: means differ by {worst:.1e}, {:.2} % of pixels within 1e-3, FLIP {flip:.5}",
+        share * 100.0
+    );
+    assert!(mc[0] > 1e-3, "{name} is black: {mc:?}");
+    assert!(flip < 0.01, "{name}: mean FLIP {flip}");
+    assert!(worst < means, "{name}: means {mc:?} and {mg:?}");
+    assert!(
+        share > pixels,
+        "{name}: only {share} of the pixels agree within 1e-3"
+    );
+}
+
+/// Rounding differs (fused multiplications), so that now and then a ray just misses what the other one hits, or a
+/// coin falls otherwise. Such a path changes one pixel by a sample's worth.
+const PIXELS: f64 = 0.98;
+/// The issue asks for 0.2 %; the strays of a 48 x 36 picture leave some 1e-4.
+const MEANS: f64 = 1e-3;
+
+#[test]
+fn curtain_before_a_panel() {
+    let even = Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35);
+    compare(
+        "even curtain",
+        &curtain_room(even, 60),
+        &settings(8),
+        PIXELS,
+        MEANS,
+    );
+}
+
+#[test]
+fn curtain_with_weave_and_lobes() {
+    compare(
+        "woven curtain",
+        &curtain_room(lace(), 60),
+        &settings(8),
+        PIXELS,
+        MEANS,
+    );
+}
+
+#[test]
+fn direct_light() {
+    let settings = Settings {
+        integrator: Integrator::Direct,
+        ..settings(8)
+    };
+    compare("direct", &curtain_room(lace(), 60), &settings, 0.99, MEANS);
+}
+
+#[test]
+fn sun_and_sky_through_the_window() {
+    let mut scene = curtain_room(lace(), 60);
+    // The panel gives way to the day.
+    scene.meshes.retain(|m| m.name != "panel");
+    let direction = Vec3::new(-0.4, 0.8, -1.0).normalize();
+    scene.lights.push(Light::Sun {
+        direction,
+        irradiance: [9.0, 8.0, 6.0],
+        angular_radius: 0.0047,
+        layer: LAYER_SUN,
+    });
+    let (width, height) = (32, 16);
+    let pixels = (0..width * height)
+        .map(|i| {
+            let up = 1.0 - (i / width) as f32 / height as f32;
+            [0.4 + 0.4 * up, 0.5 + 0.6 * up, 0.6 + 1.2 * up]
+        })
+        .collect();
+    scene.environment = Some(Environment {
+        width,
+        height,
+        pixels,
+        rotation: 0.7,
+        scale: [1.0; 3],
+        layer: LAYER_SKY,
+    });
+    let settings = Settings {
+        light_layers: true,
+        aov: true,
+        ..settings(8)
+    };
+    compare("day", &scene, &settings, PIXELS, MEANS);
+    // The layers are there, sum to the picture, and the portal does not change the mean.
+    for backend in backends() {
+        let film = picture(&scene, &settings, backend);
+        let beauty = film.beauty().expect("a picture");
+        for (i, p) in beauty.iter().enumerate() {
+            let sum: f32 = ["sun", "sky", "lamps", "other"]
+                .iter()
+                .map(|l| film.layer(&format!("light.{l}")).expect("a layer")[i][1])
+                .sum();
+            assert!(
+                (sum - p[1]).abs() <= 1e-5 * (1.0 + p[1]),
+                "{backend:?}, pixel {i}: {sum} {p:?}"
+            );
+        }
+        for name in ["albedo", "normal", "depth", "gap", "variance"] {
+            let layer = film
+                .layer(name)
+                .unwrap_or_else(|| panic!("no layer {name}"));
+            assert!(
+                layer.iter().flatten().all(|x| x.is_finite())
+                    && layer.iter().flatten().any(|&x| x != 0.0),
+                "{name}"
+            );
+        }
+    }
+}
+
+#[test]
+fn textures_and_lamps() {
+    let mut scene = curtain_room(lace(), 60);
+    let checker = |x: u32, y: u32| {
+        if (x / 4 + y / 4).is_multiple_of(2) {
+            [230, 180, 120, 255]
+        } else {
+            [90, 120, 200, 40]
+        }
+    };
+    scene.textures.push(Texture {
+        name: "checker".into(),
+        width: 16,
+        height: 16,
+        pixels: (0..256).map(|i| checker(i % 16, i / 16)).collect(),
+        srgb: true,
+        wrap_u: Wrap::Repeat,
+        wrap_v: Wrap::Mirror,
+    });
+    let used = TextureUse {
+        texture: 0,
+        transform: [[5.0, 0.3, 0.1], [-0.2, 4.0, 0.0]],
+    };
+    scene.materials[3].color_texture = Some(used);
+    scene.materials[3].coverage_texture = Some(used);
+    scene.lights.push(Light::Point {
+        position: Vec3::new(0.9, 2.2, 1.5),
+        intensity: [1.0, 0.8, 0.5],
+        layer: 2,
+    });
+    scene.lights.push(Light::Spot {
+        position: Vec3::new(-1.5, 2.4, 2.0),
+        direction: Vec3::new(0.6, -0.8, -0.5).normalize(),
+        intensity: [3.0; 3],
+        inner_angle: 0.3,
+        outer_angle: 0.6,
+        layer: 2,
+    });
+    compare("textures and lamps", &scene, &settings(8), PIXELS, MEANS);
+}
+
+#[test]
+fn furnace_of_the_woven_sheet() {
+    let mut scene = curtain_room(lace(), 40);
+    scene.meshes.retain(|m| m.name == "curtain");
+    scene.portals.clear();
+    scene.environment = Some(furnace());
+    compare("furnace", &scene, &settings(8), PIXELS, MEANS);
+}

@@ -1,5 +1,8 @@
 //! The window: its state, what changes when, and the layout. Nothing here waits for anything.
 
+mod files;
+mod options;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -13,8 +16,8 @@ use woven_render::render::Backend;
 use crate::camera::Orbit;
 use crate::cloth::Cloth;
 use crate::darkroom::{Darkroom, Recipe};
+use crate::files::Chooser;
 use crate::fitting::Fitting;
-use crate::files::{Choice, Chooser, Purpose};
 use crate::hang::Hang;
 use crate::measurement::Measurement;
 use crate::nearest::Woven;
@@ -23,42 +26,12 @@ use crate::plot::PolarPlot;
 use crate::view::View;
 use crate::worker::{Painter, Picture, Wish, Worker};
 
+pub use options::{Message, Options};
+
 /// A painter of looks.
 pub type LookPainter = Box<dyn Painter<Scene = Look>>;
 /// The longest time for which a wish waits for the first picture of the one before.
 const PATIENCE: Duration = Duration::from_millis(600);
-
-/// What the program was started with.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Fabrics to choose from; the first is shown.
-    pub fabrics: Vec<PathBuf>,
-    /// A measurement for the plot.
-    pub measurement: Option<PathBuf>,
-    /// Where the work is done.
-    pub backend: Backend,
-    /// The light at the start.
-    pub preset: Preset,
-    /// Passes after which a picture is finished.
-    pub passes: u32,
-    /// Whether the wind blows at the start.
-    pub wind: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { fabrics: Vec::new(), measurement: None, backend: Backend::Auto, preset: Preset::Day, passes: 512, wind: false }
-    }
-}
-
-/// A sentence for the user.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Message {
-    /// The sentence.
-    pub text: String,
-    /// Whether something went wrong.
-    pub wrong: bool,
-}
 
 /// The program's state.
 pub struct Viewer {
@@ -115,7 +88,11 @@ impl Viewer {
         };
         let home = Orbit::of(&Stage::new(options.preset).scene().camera, ROOM);
         let cloth = Cloth::default();
-        let folder = options.fabrics.first().and_then(|f| f.parent()).filter(|p| !p.as_os_str().is_empty());
+        let folder = options
+            .fabrics
+            .first()
+            .and_then(|f| f.parent())
+            .filter(|p| !p.as_os_str().is_empty());
         let mut viewer = Self {
             woven: cloth.woven(),
             cloth,
@@ -211,7 +188,10 @@ impl Viewer {
 
     /// Tells the user something; the last few sentences stay until they are closed.
     pub fn tell(&mut self, text: impl Into<String>, wrong: bool) {
-        let message = Message { text: text.into(), wrong };
+        let message = Message {
+            text: text.into(),
+            wrong,
+        };
         if self.messages.last() != Some(&message) {
             self.messages.push(message);
         }
@@ -220,41 +200,21 @@ impl Viewer {
         }
     }
 
-    /// Shows another fabric, or tells why not.
-    pub fn open_fabric(&mut self, path: &Path) {
-        match Cloth::open(path) {
-            Ok(cloth) => {
-                self.cloth = cloth;
-                if !self.fabrics.iter().any(|f| f == path) {
-                    self.fabrics.push(path.to_owned());
-                }
-                self.cloth_changed();
-            }
-            Err(told) => self.tell(told.to_string(), true),
-        }
-    }
-
-    /// Lays a measurement over the plot, or tells why not.
-    pub fn open_measurement(&mut self, path: &Path) {
-        match Measurement::open(path) {
-            Ok(measurement) => {
-                self.measurement = Some(measurement);
-                path.clone_into(&mut self.measured_from);
-                self.fitting = None;
-            }
-            Err(told) => self.tell(told.to_string(), true),
-        }
-    }
-
     /// Fits the chosen model to the measurement that lies over the plot.
     pub fn fit(&mut self, ctx: &egui::Context) {
         let ctx = ctx.clone();
-        self.fitting = Some(Fitting::new(self.measured_from.clone(), self.cloth.model, move || ctx.request_repaint()));
+        self.fitting = Some(Fitting::new(
+            self.measured_from.clone(),
+            self.cloth.model,
+            move || ctx.request_repaint(),
+        ));
     }
 
     /// Puts the sliders to what was fitted, if the fit is done.
     fn take_fit(&mut self) {
-        let Some(outcome) = self.fitting.as_ref().and_then(Fitting::outcome) else { return };
+        let Some(outcome) = self.fitting.as_ref().and_then(Fitting::outcome) else {
+            return;
+        };
         self.fitting = None;
         match outcome {
             Ok(fitted) => {
@@ -268,19 +228,11 @@ impl Viewer {
         }
     }
 
-    /// Opens whatever the file is, by its name's end.
-    pub fn open(&mut self, path: &Path) {
-        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("toml") => self.open_fabric(path),
-            Some("xml" | "csv") => self.open_measurement(path),
-            _ => self.tell(format!("{} is neither a fabric (.toml) nor a measurement (.xml, .csv).", path.display()), true),
-        }
-    }
-
     /// Whether all samples of the last wish are on the screen.
     #[must_use]
     pub fn finished(&self) -> bool {
-        !self.dirty && self.picture.as_ref().is_some_and(|p| p.finished && p.wish == self.worker.wishes())
+        let whole = |p: &Picture| p.finished && p.wish == self.worker.wishes();
+        !self.dirty && self.view.shown > 0 && self.picture.as_ref().is_some_and(whole)
     }
 
     pub(crate) fn cloth_changed(&mut self) {
@@ -311,73 +263,6 @@ impl Viewer {
         self.size = size;
     }
 
-    pub(crate) fn choose_file(&mut self, purpose: Purpose) {
-        let name = match purpose {
-            Purpose::SaveFabric => format!("{}.toml", file_name(self.cloth.name())),
-            Purpose::SavePicture => format!("{}.png", file_name(self.cloth.name())),
-            Purpose::OpenFabric | Purpose::OpenMeasurement => String::new(),
-        };
-        self.chooser = Some(Chooser::new(purpose, &self.folder, &name));
-    }
-
-    pub(crate) fn show_chooser(&mut self, ctx: &egui::Context) {
-        let Some(chooser) = &mut self.chooser else { return };
-        let choice = chooser.show(ctx);
-        let (purpose, folder) = (chooser.purpose, chooser.folder().to_owned());
-        match choice {
-            Choice::Open => return,
-            Choice::Cancelled => {}
-            Choice::File(path) => match purpose {
-                Purpose::OpenFabric => self.open_fabric(&path),
-                Purpose::OpenMeasurement => self.open_measurement(&path),
-                Purpose::SaveFabric => self.save_fabric(&path),
-                Purpose::SavePicture => self.save_picture(&path),
-            },
-        }
-        self.folder = folder;
-        self.chooser = None;
-    }
-
-    /// Whether the file window is open, so that keys belong to it.
-    pub(crate) fn choosing(&self) -> bool {
-        self.chooser.is_some()
-    }
-
-    /// Writes the fabric as the sliders stand.
-    pub fn save_fabric(&mut self, path: &Path) {
-        let name = path.file_stem().map_or_else(|| self.cloth.name().to_owned(), |n| n.to_string_lossy().into_owned());
-        let name = if name == file_name(self.cloth.name()) { self.cloth.name().to_owned() } else { name };
-        let text = self.cloth.fabric(&name).to_toml();
-        let written = woven_render::atomic::write_atomically(path, |out| {
-            use std::io::Write;
-            Ok(out.write_all(text.as_bytes())?)
-        });
-        match written {
-            Ok(()) => self.tell(format!("The fabric is saved as {}.", path.display()), false),
-            Err(told) => self.tell(format!("{told:#}"), true),
-        }
-    }
-
-    /// Writes the picture as it is on the screen, in a thread of its own.
-    pub fn save_picture(&mut self, path: &Path) {
-        let Some(print) = self.view.print.clone() else {
-            self.tell("There is no picture to save yet; wait a second.", true);
-            return;
-        };
-        let (path, letters) = (path.to_owned(), self.letters.0.clone());
-        let write = move || {
-            let written = woven_render::film::write_png8(&path, print.size[0], print.size[1], &print.rgb);
-            let message = match written {
-                Ok(()) => Message { text: format!("The picture is saved as {}.", path.display()), wrong: false },
-                Err(told) => Message { text: format!("{told:#}"), wrong: true },
-            };
-            letters.send(message).ok();
-        };
-        if let Err(e) = std::thread::Builder::new().name("save".to_owned()).spawn(write) {
-            self.tell(format!("The picture cannot be saved: {e}"), true);
-        }
-    }
-
     /// Takes what the threads have brought and gives them what is new. Called once a frame.
     pub fn update(&mut self, ctx: &egui::Context) {
         for file in ctx.input(|i| i.raw.dropped_files.clone()) {
@@ -390,11 +275,18 @@ impl Viewer {
         if let Some(told) = self.worker.error() {
             self.tell(told, true);
         }
-        if let Some(picture) = self.worker.newer(self.picture.as_ref().map_or(0, |p| p.number)) {
+        if let Some(picture) = self
+            .worker
+            .newer(self.picture.as_ref().map_or(0, |p| p.number))
+        {
             self.picture = Some(picture);
         }
         if let Some(picture) = &self.picture {
-            let recipe = Recipe { exposure: self.exposure + self.preset.exposure(), smooth: self.smooth, samples: picture.passes };
+            let recipe = Recipe {
+                exposure: self.exposure + self.preset.exposure(),
+                smooth: self.smooth,
+                samples: picture.passes,
+            };
             let wanted = Some((picture.number, recipe));
             if self.developed != wanted {
                 self.developed = wanted;
@@ -405,7 +297,10 @@ impl Viewer {
             self.view.set(ctx, print);
         }
         // The first picture of a wish is waited for before the next is made: a dragged slider shows its way.
-        let answered = self.picture.as_ref().is_some_and(|p| p.wish == self.worker.wishes());
+        let answered = self
+            .picture
+            .as_ref()
+            .is_some_and(|p| p.wish == self.worker.wishes());
         if !(answered || self.worker.wishes() == 0 || self.wished.elapsed() > PATIENCE) {
             if self.dirty {
                 ctx.request_repaint_after(PATIENCE);
@@ -441,27 +336,12 @@ impl Viewer {
             camera: self.orbit.camera(0.0),
             backend: self.backend,
         };
-        self.worker.wish(Wish { scene, size: self.size, passes: self.passes });
+        self.worker.wish(Wish {
+            scene,
+            size: self.size,
+            passes: self.passes,
+        });
         self.wished = Instant::now();
         self.dirty = false;
-    }
-}
-
-/// A name that every file system takes.
-fn file_name(name: &str) -> String {
-    let plain: String = name.chars().map(|c| if c.is_alphanumeric() || c == '-' { c.to_ascii_lowercase() } else { '-' }).collect();
-    let parts: Vec<_> = plain.split('-').filter(|p| !p.is_empty()).collect();
-    if parts.is_empty() { "fabric".to_owned() } else { parts.join("-") }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::file_name;
-
-    #[test]
-    fn file_names_are_plain() {
-        assert_eq!(file_name("Satine 5500 5 %, White Pearl"), "satine-5500-5-white-pearl");
-        assert_eq!(file_name("../../etc"), "etc");
-        assert_eq!(file_name("%"), "fabric");
     }
 }

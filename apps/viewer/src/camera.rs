@@ -65,7 +65,10 @@ impl Orbit {
     /// The renderer's camera.
     #[must_use]
     pub fn camera(&self, exposure: f32) -> Camera {
-        Camera { exposure, ..Camera::look_at(self.eye(), self.target, Vec3::Y, self.vfov) }
+        Camera {
+            exposure,
+            ..Camera::look_at(self.eye(), self.target, Vec3::Y, self.vfov)
+        }
     }
 
     /// Turns by a drag of `pixels` in a picture `height` pixels high: half a turn a height; the curtain follows the pointer.
@@ -102,7 +105,11 @@ impl Orbit {
         let back = self.back();
         let mut free = self.distance;
         for axis in 0..3 {
-            let wall = if back[axis] > 0.0 { high[axis] } else { low[axis] };
+            let wall = if back[axis] > 0.0 {
+                high[axis]
+            } else {
+                low[axis]
+            };
             // A wall parallel to the view is never reached.
             if back[axis].abs() > 1e-6 {
                 free = free.min((wall - self.target[axis]) / back[axis]);
@@ -121,12 +128,19 @@ mod tests {
 
     fn start() -> Orbit {
         let eye = Vec3::new(0.4, 1.3, 4.2);
-        Orbit::of(&Camera::look_at(eye, Vec3::new(0.0, 1.2, 0.2), Vec3::Y, 0.6), ROOM)
+        Orbit::of(
+            &Camera::look_at(eye, Vec3::new(0.0, 1.2, 0.2), Vec3::Y, 0.6),
+            ROOM,
+        )
     }
 
     /// Where a world point lies in a picture `height` high and as wide, in pixels from the middle, x right, y down.
     fn project(orbit: &Orbit, point: Vec3, height: f32) -> Vec2 {
-        let p = orbit.camera(0.0).transform.inverse().transform_point3(point);
+        let p = orbit
+            .camera(0.0)
+            .transform
+            .inverse()
+            .transform_point3(point);
         Vec2::new(p.x, -p.y) / -p.z * (height * 0.5 / (orbit.vfov * 0.5).tan())
     }
 
@@ -135,7 +149,12 @@ mod tests {
         let eye = Vec3::new(0.4, 1.3, 4.2);
         let camera = Camera::look_at(eye, Vec3::new(0.0, 1.2, 0.2), Vec3::Y, 0.6);
         let again = Orbit::of(&camera, ROOM).camera(0.0);
-        for (a, b) in camera.transform.to_cols_array().iter().zip(again.transform.to_cols_array()) {
+        for (a, b) in camera
+            .transform
+            .to_cols_array()
+            .iter()
+            .zip(again.transform.to_cols_array())
+        {
             // Through an arctangent and an arcsine and back in f32.
             assert!((a - b).abs() < 2e-6, "{a} {b}");
         }
@@ -143,7 +162,10 @@ mod tests {
 
     #[test]
     fn turning_keeps_the_target_and_its_distance() {
-        let before = Orbit { distance: 1.5, ..start() };
+        let before = Orbit {
+            distance: 1.5,
+            ..start()
+        };
         let after = before.orbit(Vec2::new(40.0, -15.0), 600.0);
         assert_eq!(after.target, before.target);
         assert!((after.eye().distance(after.target) - 1.5).abs() < 1e-5);
@@ -169,12 +191,21 @@ mod tests {
         let mut orbit = start();
         for i in 0..500 {
             let a = i as f32;
-            orbit = orbit.orbit(Vec2::new((a * 0.7).sin() * 90.0, (a * 1.3).cos() * 70.0), 600.0);
-            orbit = orbit.pan(Vec2::new((a * 0.3).cos() * 60.0, (a * 0.9).sin() * 50.0), 600.0);
+            orbit = orbit.orbit(
+                Vec2::new((a * 0.7).sin() * 90.0, (a * 1.3).cos() * 70.0),
+                600.0,
+            );
+            orbit = orbit.pan(
+                Vec2::new((a * 0.3).cos() * 60.0, (a * 0.9).sin() * 50.0),
+                600.0,
+            );
             orbit = orbit.zoom(1.0 + 0.4 * (a * 0.21).sin());
             for p in [orbit.eye(), orbit.target] {
                 assert!(p.is_finite());
-                assert!(p.cmpge(ROOM.0 + 0.07).all() && p.cmple(ROOM.1 - 0.07).all(), "step {i}: {p}");
+                assert!(
+                    p.cmpge(ROOM.0 + 0.07).all() && p.cmple(ROOM.1 - 0.07).all(),
+                    "step {i}: {p}"
+                );
             }
         }
     }

@@ -68,7 +68,14 @@ impl Default for Cloth {
         linen.unwrap_or_else(|_| {
             // Never reached: a test opens the linen.
             let model = &woven_bsdf::model::MODELS[0];
-            Self { fabric: Fabric::default(), model, values: model.start(), colors: white(model), reflect: 0.4, opened: None }
+            Self {
+                fabric: Fabric::default(),
+                model,
+                values: model.start(),
+                colors: white(model),
+                reflect: 0.4,
+                opened: None,
+            }
         })
     }
 }
@@ -103,14 +110,29 @@ impl Cloth {
                 Role::Shape => shapes.next().copied().unwrap_or(p.start),
             })
             .collect();
-        let colors = model.params.iter().map(|p| table.colors.get(p.name).copied().unwrap_or([1.0; 3])).collect();
-        let mut cloth = Self { fabric, model, values, colors, reflect: 0.4, opened: None };
+        let colors = model
+            .params
+            .iter()
+            .map(|p| table.colors.get(p.name).copied().unwrap_or([1.0; 3]))
+            .collect();
+        let mut cloth = Self {
+            fabric,
+            model,
+            values,
+            colors,
+            reflect: 0.4,
+            opened: None,
+        };
         cloth.opened = Some(cloth.setting());
         Ok(cloth)
     }
 
     fn setting(&self) -> Setting {
-        Setting { model: self.model.name, values: self.values.clone(), colors: self.colors.clone() }
+        Setting {
+            model: self.model.name,
+            values: self.values.clone(),
+            colors: self.colors.clone(),
+        }
     }
 
     /// What people call the cloth.
@@ -156,7 +178,11 @@ impl Cloth {
 
     /// The parameters with their places.
     pub fn params(&self, role: Role) -> impl Iterator<Item = (usize, &'static Param)> + use<> {
-        self.model.params.iter().enumerate().filter(move |(_, p)| p.role == role)
+        self.model
+            .params
+            .iter()
+            .enumerate()
+            .filter(move |(_, p)| p.role == role)
     }
 
     /// The greatest sum of the sheet's factors over the channels: more than 1 would give more light than the yarn gets.
@@ -165,7 +191,11 @@ impl Cloth {
         if self.model.name != "sheet" {
             return 0.0;
         }
-        let sum = |c: usize| self.params(Role::Linear).map(|(i, _)| self.values[i] * self.colors[i][c]).sum::<f64>();
+        let sum = |c: usize| {
+            self.params(Role::Linear)
+                .map(|(i, _)| self.values[i] * self.colors[i][c])
+                .sum::<f64>()
+        };
         (0..3).map(sum).fold(0.0, f64::max)
     }
 
@@ -182,7 +212,10 @@ impl Cloth {
         for (k, (i, _)) in linear.iter_mut().zip(self.params(Role::Linear)) {
             *k = self.colors[i].map(|c| c * self.values[i] * share);
         }
-        let shape: Vec<f64> = self.params(Role::Shape).map(|(i, _)| self.values[i]).collect();
+        let shape: Vec<f64> = self
+            .params(Role::Shape)
+            .map(|(i, _)| self.values[i])
+            .collect();
         (linear, self.model.prepare(&shape))
     }
 
@@ -203,24 +236,45 @@ impl Cloth {
     /// The straight-through share for a beam along `w`; 0 for models that have no weave.
     #[must_use]
     pub fn gap(&self, w: Vec3<f64>) -> f64 {
-        if self.model.name == "sheet" { sheet::Sheet::gap(&self.optics().1, w) } else { 0.0 }
+        if self.model.name == "sheet" {
+            sheet::Sheet::gap(&self.optics().1, w)
+        } else {
+            0.0
+        }
     }
 
     /// The fabric as it would be saved under `name`.
     #[must_use]
     pub fn fabric(&self, name: &str) -> Fabric {
         let share = self.share();
-        let mut optics = OpticsTable { model: self.model.name.to_owned(), ..OpticsTable::default() };
+        let mut optics = OpticsTable {
+            model: self.model.name.to_owned(),
+            ..OpticsTable::default()
+        };
         for (i, p) in self.model.params.iter().enumerate() {
             let linear = p.role == Role::Linear;
-            optics.parameters.insert(p.name.to_owned(), if linear { self.values[i] * share } else { self.values[i] });
+            optics.parameters.insert(
+                p.name.to_owned(),
+                if linear {
+                    self.values[i] * share
+                } else {
+                    self.values[i]
+                },
+            );
             if linear && self.colors[i] != [1.0; 3] {
                 optics.colors.insert(p.name.to_owned(), self.colors[i]);
             }
         }
-        let mut fabric = Fabric { name: name.to_owned(), optics, ..self.fabric.clone() };
+        let mut fabric = Fabric {
+            name: name.to_owned(),
+            optics,
+            ..self.fabric.clone()
+        };
         if self.changed() {
-            fabric.provenance.insert("edited".to_owned(), format!("in woven-viewer, from {:?}", self.fabric.name));
+            fabric.provenance.insert(
+                "edited".to_owned(),
+                format!("in woven-viewer, from {:?}", self.fabric.name),
+            );
         }
         if self.weave_contradicts() {
             fabric.weave = None;
@@ -230,7 +284,13 @@ impl Cloth {
 
     /// Whether the sliders of the weave have left what the file says of its yarns.
     fn weave_contradicts(&self) -> bool {
-        let Some(WeaveTable { warp_diameter_mm, warp_pitch_mm, weft_diameter_mm, weft_pitch_mm, .. }) = &self.fabric.weave
+        let Some(WeaveTable {
+            warp_diameter_mm,
+            warp_pitch_mm,
+            weft_diameter_mm,
+            weft_pitch_mm,
+            ..
+        }) = &self.fabric.weave
         else {
             return false;
         };
@@ -238,65 +298,10 @@ impl Cloth {
             let at = self.model.params.iter().position(|p| p.name == name);
             at.is_some_and(|i| (self.values[i] - (d / pitch).clamp(0.0, 1.0)).abs() > 0.01)
         };
-        off("gamma_warp", *warp_diameter_mm, *warp_pitch_mm) || off("gamma_weft", *weft_diameter_mm, *weft_pitch_mm)
+        off("gamma_warp", *warp_diameter_mm, *warp_pitch_mm)
+            || off("gamma_weft", *weft_diameter_mm, *weft_pitch_mm)
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use woven_bsdf::model::MODELS;
-
-    const LACE: &str = "name = \"lace\"\n[optics]\nmodel = \"sheet\"\n\
-        parameters = { t_d = 0.3, k_t = 0.1, r_d = 0.5, gamma_warp = 0.5, gamma_weft = 0.4 }\n\
-        [optics.colors]\nr_d = [1.0, 0.9, 0.8]\n[mechanics]\nareal_density_kg_m2 = 0.1\n";
-
-    #[test]
-    fn the_window_opens_with_linen() {
-        let cloth = Cloth::default();
-        assert!(cloth.model.name == "sheet" && cloth.name().contains("linen") && cloth.given() < 1.0);
-    }
-
-    #[test]
-    fn what_is_saved_is_what_was_seen() {
-        for model in MODELS {
-            let mut cloth = Cloth::default();
-            cloth.choose(model);
-            for (i, p) in model.params.iter().enumerate() {
-                cloth.values[i] = p.min + (p.max - p.min) * 0.3;
-                cloth.colors[i] = [1.0, 0.5, 0.25];
-            }
-            let text = cloth.fabric("again").to_toml();
-            let back = Cloth::of(Fabric::from_toml(&text).expect("its own files are read")).expect("and are sound");
-            let ((a, s), (b, t)) = (cloth.optics(), back.optics());
-            for (x, y) in a.iter().flatten().chain(&s).zip(b.iter().flatten().chain(&t)) {
-                assert!((x - y).abs() < 1e-12 * x.abs().max(1.0), "{}: {x} {y}", model.name);
-            }
-        }
-    }
-
-    #[test]
-    fn reset_goes_back_to_the_file() {
-        let mut cloth = Cloth::of(Fabric::from_toml(LACE).expect("it is sound")).expect("it is sound");
-        let (before, r_d) = (cloth.values.clone(), 2);
-        assert!(!cloth.changed() && cloth.values[r_d] == 0.5);
-        cloth.values[r_d] = 0.1;
-        assert!(cloth.changed() && cloth.start_of(r_d) == 0.5);
-        cloth.reset();
-        assert_eq!(cloth.values, before);
-        assert_eq!(cloth.mechanics()["areal_density_kg_m2"], 0.1);
-    }
-
-    #[test]
-    fn a_yarn_never_gives_more_than_it_gets() {
-        let mut cloth = Cloth::default();
-        for (i, _) in cloth.params(Role::Linear) {
-            cloth.values[i] = 1.0;
-            cloth.colors[i] = [1.0; 3];
-        }
-        assert_eq!(cloth.given(), 4.0);
-        let sum: f64 = cloth.optics().0.iter().map(|k| k[1]).sum();
-        assert!((sum - 1.0).abs() < 1e-12);
-        assert!(Fabric::from_toml(&cloth.fabric("full").to_toml()).is_ok());
-    }
-}
+mod tests;

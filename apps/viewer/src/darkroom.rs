@@ -77,7 +77,13 @@ pub fn develop(film: &Film, recipe: Recipe) -> Vec<u8> {
         // One round less for each doubling of the samples.
         smooth(&mut film, 5 - recipe.samples.max(1).ilog2());
     } else {
-        denoise(&mut film, &denoise::Settings { radius: RADIUS, ..denoise::Settings::default() });
+        denoise(
+            &mut film,
+            &denoise::Settings {
+                radius: RADIUS,
+                ..denoise::Settings::default()
+            },
+        );
     }
     film.to_rgb8(Curve::Filmic, recipe.exposure)
 }
@@ -92,20 +98,32 @@ impl Darkroom {
             loop {
                 let mut tray = theirs.tray();
                 while tray.next.is_none() && !tray.closing {
-                    tray = theirs.news.wait(tray).unwrap_or_else(PoisonError::into_inner);
+                    tray = theirs
+                        .news
+                        .wait(tray)
+                        .unwrap_or_else(PoisonError::into_inner);
                 }
                 if tray.closing {
                     return;
                 }
-                let Some(Negative { film, recipe }) = tray.next.take() else { continue };
+                let Some(Negative { film, recipe }) = tray.next.take() else {
+                    continue;
+                };
                 drop(tray);
                 number += 1;
                 let rgb = Arc::new(develop(&film, recipe));
-                theirs.tray().print = Some(Print { number, size: [film.width, film.height], rgb });
+                theirs.tray().print = Some(Print {
+                    number,
+                    size: [film.width, film.height],
+                    rgb,
+                });
                 wake();
             }
         };
-        let thread = std::thread::Builder::new().name("develop".to_owned()).spawn(run).ok();
+        let thread = std::thread::Builder::new()
+            .name("develop".to_owned())
+            .spawn(run)
+            .ok();
         Self { shared, thread }
     }
 
@@ -118,7 +136,12 @@ impl Darkroom {
     /// The newest print, if it is newer than number `seen`.
     #[must_use]
     pub fn newer(&self, seen: u64) -> Option<Print> {
-        self.shared.tray().print.as_ref().filter(|p| p.number > seen).cloned()
+        self.shared
+            .tray()
+            .print
+            .as_ref()
+            .filter(|p| p.number > seen)
+            .cloned()
     }
 }
 
@@ -139,8 +162,19 @@ mod tests {
     #[test]
     fn a_print_is_the_film_of_the_renderer() {
         let darkroom = Darkroom::new(|| ());
-        let film = Arc::new(Film::of_beauty(2, 1, vec![[0.18, 0.18, 0.18], [4.0, 0.0, 0.0]]));
-        darkroom.put(Arc::clone(&film), Recipe { exposure: 1.0, smooth: false, samples: 1 });
+        let film = Arc::new(Film::of_beauty(
+            2,
+            1,
+            vec![[0.18, 0.18, 0.18], [4.0, 0.0, 0.0]],
+        ));
+        darkroom.put(
+            Arc::clone(&film),
+            Recipe {
+                exposure: 1.0,
+                smooth: false,
+                samples: 1,
+            },
+        );
         let begin = std::time::Instant::now();
         let print = loop {
             if let Some(print) = darkroom.newer(0) {

@@ -77,7 +77,13 @@ impl Chooser {
     #[must_use]
     pub fn new(purpose: Purpose, folder: &Path, name: &str) -> Self {
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-        let mut chooser = Self { purpose, folder, name: name.to_owned(), entries: Ok(Vec::new()), asked: false };
+        let mut chooser = Self {
+            purpose,
+            folder,
+            name: name.to_owned(),
+            entries: Ok(Vec::new()),
+            asked: false,
+        };
         chooser.list();
         chooser
     }
@@ -90,14 +96,23 @@ impl Chooser {
 
     fn list(&mut self) {
         let wanted = |name: &str| {
-            let end = Path::new(name).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+            let end = Path::new(name)
+                .extension()
+                .and_then(|e| e.to_str())
+                .unwrap_or_default()
+                .to_ascii_lowercase();
             self.purpose.extensions().contains(&end.as_str())
         };
         self.entries = std::fs::read_dir(&self.folder)
             .map(|dir| {
                 let mut entries: Vec<_> = dir
                     .filter_map(Result::ok)
-                    .map(|e| (e.file_name().to_string_lossy().into_owned(), e.path().is_dir()))
+                    .map(|e| {
+                        (
+                            e.file_name().to_string_lossy().into_owned(),
+                            e.path().is_dir(),
+                        )
+                    })
                     .filter(|(name, folder)| !name.starts_with('.') && (*folder || wanted(name)))
                     .collect();
                 entries.sort_by_key(|(name, folder)| (!folder, name.to_lowercase()));
@@ -142,34 +157,48 @@ impl Chooser {
         let mut chosen = false;
         ui.horizontal(|ui| {
             if let Some(parent) = self.folder.parent().map(Path::to_owned)
-                && ui.button("Up").on_hover_text("To the folder above").clicked()
+                && ui
+                    .button("Up")
+                    .on_hover_text("To the folder above")
+                    .clicked()
             {
                 self.enter(parent);
             }
             ui.add(egui::Label::new(style::weak(self.folder.display().to_string())).truncate());
         });
         let mut entered = None;
-        ScrollArea::vertical().max_height(250.0).min_scrolled_height(250.0).auto_shrink([false, false]).show(ui, |ui| match &self.entries {
-            Err(told) => {
-                ui.colored_label(style::WRONG, told);
-            }
-            Ok(entries) if entries.is_empty() => {
-                ui.label(style::weak(format!("No .{} here.", self.purpose.extensions().join(" or ."))));
-            }
-            Ok(entries) => {
-                for (name, folder) in entries {
-                    let shown = if *folder { format!("{name}/") } else { name.clone() };
-                    let row = ui.selectable_label(!folder && *name == self.name, shown);
-                    if row.clicked() && *folder {
-                        entered = Some(self.folder.join(name));
-                    } else if row.clicked() {
-                        self.name.clone_from(name);
-                        self.asked = false;
-                    }
-                    chosen |= row.double_clicked() && !folder;
+        ScrollArea::vertical()
+            .max_height(250.0)
+            .min_scrolled_height(250.0)
+            .auto_shrink([false, false])
+            .show(ui, |ui| match &self.entries {
+                Err(told) => {
+                    ui.colored_label(style::WRONG, told);
                 }
-            }
-        });
+                Ok(entries) if entries.is_empty() => {
+                    ui.label(style::weak(format!(
+                        "No .{} here.",
+                        self.purpose.extensions().join(" or .")
+                    )));
+                }
+                Ok(entries) => {
+                    for (name, folder) in entries {
+                        let shown = if *folder {
+                            format!("{name}/")
+                        } else {
+                            name.clone()
+                        };
+                        let row = ui.selectable_label(!folder && *name == self.name, shown);
+                        if row.clicked() && *folder {
+                            entered = Some(self.folder.join(name));
+                        } else if row.clicked() {
+                            self.name.clone_from(name);
+                            self.asked = false;
+                        }
+                        chosen |= row.double_clicked() && !folder;
+                    }
+                }
+            });
         if let Some(folder) = entered {
             self.enter(folder);
         }
@@ -177,10 +206,18 @@ impl Chooser {
         ui.horizontal(|ui| {
             let label = ui.label("File");
             let width = ui.available_width() - 150.0;
-            let field = ui.add(TextEdit::singleline(&mut self.name).desired_width(width)).labelled_by(label.id);
+            let field = ui
+                .add(TextEdit::singleline(&mut self.name).desired_width(width))
+                .labelled_by(label.id);
             self.asked &= !field.changed();
             chosen |= field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
-            chosen |= ui.button(if self.asked { "Replace" } else { self.purpose.verb() }).clicked();
+            chosen |= ui
+                .button(if self.asked {
+                    "Replace"
+                } else {
+                    self.purpose.verb()
+                })
+                .clicked();
             cancelled = ui.button("Cancel").clicked();
         });
         if self.asked {
@@ -215,18 +252,34 @@ mod tests {
         let assets = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets"));
         let chooser = Chooser::new(Purpose::OpenMeasurement, assets, "");
         let entries = chooser.entries.clone().expect("it is there");
-        assert!(entries.iter().any(|(n, folder)| n == "measurements" && *folder));
+        assert!(
+            entries
+                .iter()
+                .any(|(n, folder)| n == "measurements" && *folder)
+        );
         assert!(!entries.iter().any(|(n, _)| n == "catalog.toml"));
         let inside = Chooser::new(Purpose::OpenMeasurement, &assets.join("measurements"), "");
-        let names: Vec<_> = inside.entries.expect("it is there").into_iter().map(|(n, _)| n).collect();
-        assert!(names.contains(&"mecho_6216_goniometer.xml".to_owned()) && !names.contains(&"README.md".to_owned()));
+        let names: Vec<_> = inside
+            .entries
+            .expect("it is there")
+            .into_iter()
+            .map(|(n, _)| n)
+            .collect();
+        assert!(
+            names.contains(&"mecho_6216_goniometer.xml".to_owned())
+                && !names.contains(&"README.md".to_owned())
+        );
     }
 
     #[test]
     fn a_saved_file_gets_its_extension_and_a_missing_folder_is_told() {
         let chooser = Chooser::new(Purpose::SavePicture, Path::new("/"), "window");
         assert_eq!(chooser.file(), Path::new("/window.png"));
-        let nowhere = Chooser::new(Purpose::OpenFabric, Path::new("/there/is/no/such/folder"), "");
+        let nowhere = Chooser::new(
+            Purpose::OpenFabric,
+            Path::new("/there/is/no/such/folder"),
+            "",
+        );
         assert!(nowhere.entries.is_err_and(|e| e.contains("no/such/folder")));
     }
 }

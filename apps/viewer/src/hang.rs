@@ -48,7 +48,11 @@ impl Shared {
     fn publish(&self, mesh: CurtainMesh, at_rest: bool) -> bool {
         let mut board = self.board();
         let number = board.latest.as_ref().map_or(0, |m| m.number) + 1;
-        board.latest = Some(Moment { number, mesh: Arc::new(mesh), at_rest });
+        board.latest = Some(Moment {
+            number,
+            mesh: Arc::new(mesh),
+            at_rest,
+        });
         !board.closing
     }
 
@@ -62,7 +66,10 @@ impl Shared {
             if until(&board) {
                 return Some(board.wind);
             }
-            board = self.news.wait(board).unwrap_or_else(PoisonError::into_inner);
+            board = self
+                .news
+                .wait(board)
+                .unwrap_or_else(PoisonError::into_inner);
         }
     }
 }
@@ -84,7 +91,10 @@ impl Hang {
                 wake();
             }
         };
-        let thread = std::thread::Builder::new().name("cloth".to_owned()).spawn(run).ok();
+        let thread = std::thread::Builder::new()
+            .name("cloth".to_owned())
+            .spawn(run)
+            .ok();
         Self { shared, thread }
     }
 
@@ -136,7 +146,11 @@ fn live(shared: &Shared, spec: &CurtainSpec, wake: &impl Fn()) -> Result<(), wov
         return Ok(());
     }
     loop {
-        let Some(_) = shared.wait(|b| b.wind && b.latest.as_ref().is_none_or(|m| m.number <= b.taken)) else { return Ok(()) };
+        let Some(_) =
+            shared.wait(|b| b.wind && b.latest.as_ref().is_none_or(|m| m.number <= b.taken))
+        else {
+            return Ok(());
+        };
         let begin = Instant::now();
         simulation.run(1.0 / FPS)?;
         std::thread::sleep(Duration::from_secs_f64(1.0 / FPS).saturating_sub(begin.elapsed()));
@@ -152,9 +166,17 @@ fn placed(simulation: &Simulation) -> CurtainMesh {
     let place = Vec3::new((CURTAIN_SPAN.0 + CURTAIN_SPAN.1) * 0.5, 0.0, RAIL_DISTANCE);
     let size = Vec2::from(mesh.fabric_size);
     CurtainMesh {
-        positions: mesh.positions.iter().map(|p| Vec3::from(*p) + place).collect(),
+        positions: mesh
+            .positions
+            .iter()
+            .map(|p| Vec3::from(*p) + place)
+            .collect(),
         normals: mesh.normals.iter().copied().map(Vec3::from).collect(),
         uvs: mesh.uvs.iter().map(|uv| Vec2::from(*uv) * size).collect(),
-        indices: mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        indices: mesh
+            .indices
+            .chunks_exact(3)
+            .map(|t| [t[0], t[1], t[2]])
+            .collect(),
     }
 }

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use woven_bsdf::measured::Refused;
 use woven_bsdf::measured::csv::Scan;
 use woven_bsdf::measured::klems::{Kind, Klems, Patch};
-use woven_bsdf::measured::Refused;
 use woven_bsdf::vec3::Vec3;
 
 use crate::polar::Plane;
@@ -53,11 +53,22 @@ impl Measurement {
     /// # Errors
     /// A sentence with the file and the place.
     pub fn open(path: &Path) -> Result<Self, Refused> {
-        let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        let name = path
+            .file_stem()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        match path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase)
+            .as_deref()
+        {
             Some("xml") => Ok(Self::Klems(Klems::read(path)?)),
             Some("csv") => Ok(Self::Scan(Scan::read(path)?, name)),
-            _ => Err(Refused::new(format!("{}: a measurement is a Klems .xml or a .csv of the rig", path.display()))),
+            _ => Err(Refused::new(format!(
+                "{}: a measurement is a Klems .xml or a .csv of the rig",
+                path.display()
+            ))),
         }
     }
 
@@ -91,27 +102,51 @@ fn apart(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
 /// The plane of a light in front of the sheet; at normal incidence the azimuth is that of `wanted`.
 fn plane_of(l: Vec3<f64>, wanted: Plane) -> Plane {
     let (theta, phi) = l.to_angles();
-    if theta < 1e-9 { Plane { theta: 0.0, ..wanted } } else { Plane { theta, phi } }
+    if theta < 1e-9 {
+        Plane {
+            theta: 0.0,
+            ..wanted
+        }
+    } else {
+        Plane { theta, phi }
+    }
 }
 
 fn klems_slice(klems: &Klems, wanted: Plane) -> Slice {
     let Some((incident, _)) = klems
         .patches
         .iter()
-        .map(|p| apart(Kind::TransmissionFront.l((p.theta(), p.phi)), wanted.light()))
+        .map(|p| {
+            apart(
+                Kind::TransmissionFront.l((p.theta(), p.phi)),
+                wanted.light(),
+            )
+        })
         .enumerate()
         .min_by(|a, b| a.1.total_cmp(&b.1))
     else {
         return Slice::default();
     };
     let centre = |p: &Patch| (p.theta(), p.phi);
-    let plane = plane_of(Kind::TransmissionFront.l(centre(&klems.patches[incident])), wanted);
-    let mut slice = Slice { plane: Some(plane), ..Slice::default() };
+    let plane = plane_of(
+        Kind::TransmissionFront.l(centre(&klems.patches[incident])),
+        wanted,
+    );
+    let mut slice = Slice {
+        plane: Some(plane),
+        ..Slice::default()
+    };
     let n = klems.patches.len();
     for kind in [Kind::TransmissionFront, Kind::ReflectionFront] {
         // The first block of a kind is the visible one in these files; a later band is another wavelength.
-        let visible = |b: &&woven_bsdf::measured::klems::Block| b.kind == kind && b.band == "Visible";
-        let Some(block) = klems.blocks.iter().find(visible).or_else(|| klems.blocks.iter().find(|b| b.kind == kind)) else {
+        let visible =
+            |b: &&woven_bsdf::measured::klems::Block| b.kind == kind && b.band == "Visible";
+        let Some(block) = klems
+            .blocks
+            .iter()
+            .find(visible)
+            .or_else(|| klems.blocks.iter().find(|b| b.kind == kind))
+        else {
             continue;
         };
         let mut passed = 0.0;
@@ -123,7 +158,11 @@ fn klems_slice(klems: &Klems, wanted: Plane) -> Slice {
             let off = (patch.phi - plane.phi).rem_euclid(std::f64::consts::PI);
             let inside = off.min(std::f64::consts::PI - off) <= patch.phi_width * 0.5 + 1e-9;
             if inside || patch.theta_lo == 0.0 {
-                slice.readings.push(Reading { psi, f, straight: kind.transmits() && row == incident });
+                slice.readings.push(Reading {
+                    psi,
+                    f,
+                    straight: kind.transmits() && row == incident,
+                });
             }
         }
         if kind.transmits() {
@@ -134,8 +173,15 @@ fn klems_slice(klems: &Klems, wanted: Plane) -> Slice {
 }
 
 fn scan_slice(scan: &Scan, wanted: Plane) -> Slice {
-    let lights = scan.samples.iter().map(|s| s.l).chain(scan.direct.iter().map(|d| d.l)).filter(|l| l.z > 0.0);
-    let Some(l) = lights.min_by(|a, b| apart(*a, wanted.light()).total_cmp(&apart(*b, wanted.light()))) else {
+    let lights = scan
+        .samples
+        .iter()
+        .map(|s| s.l)
+        .chain(scan.direct.iter().map(|d| d.l))
+        .filter(|l| l.z > 0.0);
+    let Some(l) =
+        lights.min_by(|a, b| apart(*a, wanted.light()).total_cmp(&apart(*b, wanted.light())))
+    else {
         return Slice::default();
     };
     let plane = plane_of(l, wanted);
@@ -146,10 +192,23 @@ fn scan_slice(scan: &Scan, wanted: Plane) -> Slice {
         .filter(|s| near(s.l))
         .map(|s| (plane.angles(s.v), s.f))
         .filter(|((_, out), _)| out.abs() < OUT_OF_PLANE)
-        .map(|((psi, _), f)| Reading { psi, f, straight: false })
+        .map(|((psi, _), f)| Reading {
+            psi,
+            f,
+            straight: false,
+        })
         .collect();
-    let direct = scan.direct.iter().find(|d| near(d.l)).map(|d| d.transmittance);
-    Slice { plane: Some(plane), readings, transmittance: None, direct }
+    let direct = scan
+        .direct
+        .iter()
+        .find(|d| near(d.l))
+        .map(|d| d.transmittance);
+    Slice {
+        plane: Some(plane),
+        readings,
+        transmittance: None,
+        direct,
+    }
 }
 
 #[cfg(test)]
@@ -158,7 +217,10 @@ mod tests {
     use woven_bsdf::measured::csv::{Direct, Sample};
 
     fn goniometer() -> Measurement {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/measurements/mecho_6216_goniometer.xml");
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../assets/measurements/mecho_6216_goniometer.xml"
+        );
         Measurement::open(Path::new(path)).expect("the shipped file is sound")
     }
 
@@ -167,33 +229,68 @@ mod tests {
         let data = goniometer();
         for degrees in [0.0_f64, 20.0, 40.0] {
             for phi in [0.0, std::f64::consts::FRAC_PI_2] {
-                let slice = data.slice(Plane { theta: degrees.to_radians(), phi });
+                let slice = data.slice(Plane {
+                    theta: degrees.to_radians(),
+                    phi,
+                });
                 let plane = slice.plane.expect("it has patches");
-                assert!((plane.theta - degrees.to_radians()).abs() < 0.01, "{degrees}: {}", plane.theta.to_degrees());
-                let peak = slice.readings.iter().filter(|r| r.psi.abs() > 1.58).max_by(|a, b| a.f.total_cmp(&b.f));
+                assert!(
+                    (plane.theta - degrees.to_radians()).abs() < 0.01,
+                    "{degrees}: {}",
+                    plane.theta.to_degrees()
+                );
+                let peak = slice
+                    .readings
+                    .iter()
+                    .filter(|r| r.psi.abs() > 1.58)
+                    .max_by(|a, b| a.f.total_cmp(&b.f));
                 let peak = peak.expect("there are readings");
                 assert!(peak.straight, "{degrees}: {peak:?}");
-                assert!((peak.psi.sin() - plane.straight().sin()).abs() < 1e-6, "{peak:?}");
+                assert!(
+                    (peak.psi.sin() - plane.straight().sin()).abs() < 1e-6,
+                    "{peak:?}"
+                );
                 assert!(slice.readings.len() > 10, "{}", slice.readings.len());
             }
         }
         // 0.0179 is the file's transmittance at normal incidence as told in the project's notes.
-        let normal = data.slice(Plane { theta: 0.0, phi: 0.0 });
+        let normal = data.slice(Plane {
+            theta: 0.0,
+            phi: 0.0,
+        });
         let transmittance = normal.transmittance.expect("it has the hemisphere");
         assert!((transmittance - 0.0179).abs() < 1e-4, "{transmittance}");
     }
 
     #[test]
     fn a_scan_gives_back_what_lies_in_the_plane() {
-        let plane = Plane { theta: 0.5, phi: 0.0 };
-        let value = |psi: f64, f: f64| Sample { l: plane.light(), v: plane.direction(psi), f, sigma: None };
-        let out_of_plane = Sample { v: Vec3::from_angles(2.5, 1.0), ..value(0.0, 9.0) };
+        let plane = Plane {
+            theta: 0.5,
+            phi: 0.0,
+        };
+        let value = |psi: f64, f: f64| Sample {
+            l: plane.light(),
+            v: plane.direction(psi),
+            f,
+            sigma: None,
+        };
+        let out_of_plane = Sample {
+            v: Vec3::from_angles(2.5, 1.0),
+            ..value(0.0, 9.0)
+        };
         let scan = Scan {
             samples: vec![value(-2.0, 0.25), value(-2.6, 0.5), out_of_plane],
-            direct: vec![Direct { l: plane.light(), transmittance: 0.125, sigma: None }],
+            direct: vec![Direct {
+                l: plane.light(),
+                transmittance: 0.125,
+                sigma: None,
+            }],
             comments: Vec::new(),
         };
-        let slice = Measurement::Scan(scan, String::new()).slice(Plane { theta: 0.48, phi: 0.01 });
+        let slice = Measurement::Scan(scan, String::new()).slice(Plane {
+            theta: 0.48,
+            phi: 0.01,
+        });
         let values: Vec<_> = slice.readings.iter().map(|r| r.f).collect();
         assert_eq!(values, [0.5, 0.25]);
         assert!((slice.readings[0].psi + 2.6).abs() < 1e-9);
@@ -203,7 +300,9 @@ mod tests {
     #[test]
     fn a_bad_file_is_a_sentence() {
         for name in ["nothing.xml", "nothing.csv", "nothing.doc"] {
-            let told = Measurement::open(Path::new(name)).expect_err("it is not there").to_string();
+            let told = Measurement::open(Path::new(name))
+                .expect_err("it is not there")
+                .to_string();
             assert!(told.contains(name), "{told}");
         }
     }

@@ -70,15 +70,22 @@ impl StagePainter {
     /// Moves camera and curtain of the renderers that are there; false when they have to be made anew.
     fn moved(&mut self, old: &Look, new: &Look) -> Result<bool, String> {
         let same = old.preset == new.preset && old.backend == new.backend && old.cloth == new.cloth;
-        if !same || old.curtain.indices != new.curtain.indices || old.curtain.positions.len() != new.curtain.positions.len() {
+        if !same
+            || old.curtain.indices != new.curtain.indices
+            || old.curtain.positions.len() != new.curtain.positions.len()
+        {
             return Ok(false);
         }
         let mesh = self.stage(new.preset).curtain();
         for (_, renderer) in &mut self.renderers {
             if !Arc::ptr_eq(&old.curtain, &new.curtain) {
-                renderer.move_mesh(mesh, &new.curtain.positions, &new.curtain.normals).map_err(|e| format!("{e:#}"))?;
+                renderer
+                    .move_mesh(mesh, &new.curtain.positions, &new.curtain.normals)
+                    .map_err(|e| format!("{e:#}"))?;
             }
-            renderer.set_camera(new.camera).map_err(|e| format!("{e:#}"))?;
+            renderer
+                .set_camera(new.camera)
+                .map_err(|e| format!("{e:#}"))?;
         }
         Ok(true)
     }
@@ -89,10 +96,25 @@ impl StagePainter {
         if let Some(at) = self.renderers.iter().position(|(s, _)| *s == size) {
             return Ok(&mut self.renderers[at].1);
         }
-        let Some(look) = self.look.clone() else { return Err("There is nothing to render yet.".to_owned()) };
-        let settings = Settings { width: size[0] as u32, height: size[1] as u32, spp: 1 << 20, depth: DEPTH, seed: 1, aov: true, ..Settings::default() };
-        let backend = if self.no_gpu { Backend::Cpu } else { look.backend };
-        let renderer = Renderer::new(self.stage(look.preset).scene(), &settings, backend).map_err(told)?;
+        let Some(look) = self.look.clone() else {
+            return Err("There is nothing to render yet.".to_owned());
+        };
+        let settings = Settings {
+            width: size[0] as u32,
+            height: size[1] as u32,
+            spp: 1 << 20,
+            depth: DEPTH,
+            seed: 1,
+            aov: true,
+            ..Settings::default()
+        };
+        let backend = if self.no_gpu {
+            Backend::Cpu
+        } else {
+            look.backend
+        };
+        let renderer =
+            Renderer::new(self.stage(look.preset).scene(), &settings, backend).map_err(told)?;
         if self.renderers.len() == KEPT {
             self.renderers.remove(0);
         }
@@ -121,7 +143,12 @@ impl Painter for StagePainter {
         Ok(())
     }
 
-    fn pass(&mut self, size: [usize; 2], pass: u32, stop: &AtomicBool) -> Result<Option<Film>, String> {
+    fn pass(
+        &mut self,
+        size: [usize; 2],
+        pass: u32,
+        stop: &AtomicBool,
+    ) -> Result<Option<Film>, String> {
         let told = |e: anyhow::Error| format!("{e:#}");
         let renderer = self.renderer(size)?;
         if pass == 0 && renderer.samples() > 0 {

@@ -18,7 +18,11 @@ impl Plane {
     /// itself, ±π the normal behind the sheet.
     #[must_use]
     pub fn direction(self, psi: f64) -> Vec3<f64> {
-        Vec3::new(psi.sin() * self.phi.cos(), psi.sin() * self.phi.sin(), psi.cos())
+        Vec3::new(
+            psi.sin() * self.phi.cos(),
+            psi.sin() * self.phi.sin(),
+            psi.cos(),
+        )
     }
     /// The direction to the light.
     #[must_use]
@@ -53,10 +57,22 @@ pub struct Value {
 /// `linear` holds the factors in the model's order, `shape` is prepared. The steps are finer around the straight-through
 /// direction and its mirror image, where lobes can be a degree wide.
 #[must_use]
-pub fn curve(model: &ModelInfo, linear: &model::Linear<f64>, shape: &model::Shape<f64>, plane: Plane) -> Vec<Value> {
+pub fn curve(
+    model: &ModelInfo,
+    linear: &model::Linear<f64>,
+    shape: &model::Shape<f64>,
+    plane: Plane,
+) -> Vec<Value> {
     let l = plane.light();
-    let value = |psi: f64| Value { psi, f: dot(linear, &(model.f64.basis)(shape, l, plane.direction(psi))) };
-    angles(plane).into_iter().map(value).filter(|v| v.f.is_finite()).collect()
+    let value = |psi: f64| Value {
+        psi,
+        f: dot(linear, &(model.f64.basis)(shape, l, plane.direction(psi))),
+    };
+    angles(plane)
+        .into_iter()
+        .map(value)
+        .filter(|v| v.f.is_finite())
+        .collect()
 }
 
 /// The angles of a curve, rising, none within 0.2° of grazing.
@@ -84,10 +100,22 @@ impl Scale {
     /// A scale whose outermost circle carries a round number, at least `greatest`.
     #[must_use]
     pub fn fitting(greatest: f64, decades: Option<f64>) -> Self {
-        let greatest = if greatest.is_finite() && greatest > 1e-9 { greatest } else { 1.0 };
+        let greatest = if greatest.is_finite() && greatest > 1e-9 {
+            greatest
+        } else {
+            1.0
+        };
         let ten = 10_f64.powf(greatest.log10().floor());
-        let steps: &[f64] = if decades.is_some() { &[1.0, 10.0] } else { &[1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0] };
-        let top = steps.iter().map(|s| s * ten).find(|t| *t >= greatest * (1.0 - 1e-9)).unwrap_or(10.0 * ten);
+        let steps: &[f64] = if decades.is_some() {
+            &[1.0, 10.0]
+        } else {
+            &[1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0]
+        };
+        let top = steps
+            .iter()
+            .map(|s| s * ten)
+            .find(|t| *t >= greatest * (1.0 - 1e-9))
+            .unwrap_or(10.0 * ten);
         Self { top, decades }
     }
     /// Distance from the middle, 0…1 for values up to the top.
@@ -117,8 +145,13 @@ impl Scale {
     #[must_use]
     pub fn circles(self) -> Vec<f64> {
         match self.decades {
-            None => (1..=4).rev().map(|i| self.top * f64::from(i) / 4.0).collect(),
-            Some(decades) => (0..decades as i32).map(|i| self.top / 10_f64.powi(i)).collect(),
+            None => (1..=4)
+                .rev()
+                .map(|i| self.top * f64::from(i) / 4.0)
+                .collect(),
+            Some(decades) => (0..decades as i32)
+                .map(|i| self.top / 10_f64.powi(i))
+                .collect(),
         }
     }
 }
@@ -127,7 +160,12 @@ impl Scale {
 ///
 /// A product rule around the straight-through (and mirror) direction, where the values are: 24 rings of sin², 32 spokes.
 #[must_use]
-pub fn albedo(model: &ModelInfo, linear: &model::Linear<f64>, shape: &model::Shape<f64>, l: Vec3<f64>) -> [f64; 2] {
+pub fn albedo(
+    model: &ModelInfo,
+    linear: &model::Linear<f64>,
+    shape: &model::Shape<f64>,
+    l: Vec3<f64>,
+) -> [f64; 2] {
     const RINGS: usize = 64;
     const SPOKES: usize = 48;
     let mut sums = [0.0; 2];
@@ -135,7 +173,11 @@ pub fn albedo(model: &ModelInfo, linear: &model::Linear<f64>, shape: &model::Sha
         let peak = Vec3::new(-l.x, -l.y, l.z.abs() * side * l.z.signum());
         // The frame around the peak.
         let (theta, phi) = peak.to_angles();
-        let t = Vec3::new(theta.cos() * phi.cos(), theta.cos() * phi.sin(), -theta.sin());
+        let t = Vec3::new(
+            theta.cos() * phi.cos(),
+            theta.cos() * phi.sin(),
+            -theta.sin(),
+        );
         let b = Vec3::new(-phi.sin(), phi.cos(), 0.0);
         for i in 0..RINGS {
             // Angle from the peak δ = π x³: fine where a narrow lobe is, dδ = 3π x² dx.
@@ -162,14 +204,20 @@ mod tests {
 
     #[test]
     fn the_curve_on_the_plot_is_the_model() {
-        let plane = Plane { theta: 0.6, phi: 0.3 };
+        let plane = Plane {
+            theta: 0.6,
+            phi: 0.3,
+        };
         for model in MODELS {
             let values = model.start();
             let (linear, shape) = model.split(&values);
             let curve = curve(model, &linear, &shape, plane);
             assert!(curve.len() > 350, "{}", model.name);
             let greatest = curve.iter().map(|v| v.f).fold(0.0, f64::max);
-            for scale in [Scale::fitting(greatest, None), Scale::fitting(greatest, Some(4.0))] {
+            for scale in [
+                Scale::fitting(greatest, None),
+                Scale::fitting(greatest, Some(4.0)),
+            ] {
                 for value in &curve {
                     // Read the plot as an eye does: angle and distance of the drawn point, back to a value.
                     let [x, y] = scale.place(*value);
@@ -181,7 +229,12 @@ mod tests {
                     let v = plane.direction((-x).atan2(y));
                     let f = model.eval(&values, plane.light(), v);
                     // Rounding of angles in f64, steep lobes included.
-                    assert!((read - f).abs() < 1e-6 * f.max(1e-3), "{} at {}: {read} {f}", model.name, value.psi);
+                    assert!(
+                        (read - f).abs() < 1e-6 * f.max(1e-3),
+                        "{} at {}: {read} {f}",
+                        model.name,
+                        value.psi
+                    );
                 }
             }
         }
@@ -189,16 +242,28 @@ mod tests {
 
     #[test]
     fn straight_on_is_opposite_to_the_light() {
-        let plane = Plane { theta: 0.5, phi: 1.1 };
+        let plane = Plane {
+            theta: 0.5,
+            phi: 1.1,
+        };
         let (l, s) = (plane.light(), plane.direction(plane.straight()));
         assert!((l + s).length_sqr() < 1e-24);
         let (psi, out) = plane.angles(s);
         assert!((psi - plane.straight()).abs() < 1e-12 && out.abs() < 1e-12);
         // From the upper left to the lower right.
-        let scale = Scale { top: 1.0, decades: None };
-        let [x, y] = scale.place(Value { psi: plane.theta, f: 1.0 });
+        let scale = Scale {
+            top: 1.0,
+            decades: None,
+        };
+        let [x, y] = scale.place(Value {
+            psi: plane.theta,
+            f: 1.0,
+        });
         assert!(x < 0.0 && y > 0.0);
-        let [x, y] = scale.place(Value { psi: plane.straight(), f: 1.0 });
+        let [x, y] = scale.place(Value {
+            psi: plane.straight(),
+            f: 1.0,
+        });
         assert!(x > 0.0 && y < 0.0);
     }
 
@@ -221,7 +286,10 @@ mod tests {
             let (linear, shape) = model.split(&[0.37]);
             let [t, r] = albedo(model, &linear, &shape, Vec3::from_angles(theta, 0.4));
             // Midpoints with a cut-off hemisphere: about 1 % worst.
-            assert!((t / 0.37 - 1.0).abs() < 0.015 && r == 0.0, "{theta}: {t} {r}");
+            assert!(
+                (t / 0.37 - 1.0).abs() < 0.015 && r == 0.0,
+                "{theta}: {t} {r}"
+            );
         }
     }
 }

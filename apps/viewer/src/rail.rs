@@ -14,8 +14,14 @@ const GRID: [u32; 2] = [88, 48];
 /// A sentence when the built-in catalog is broken.
 pub fn curtain(cloth: &Cloth) -> Result<CurtainSpec, String> {
     let catalog = Catalog::builtin().map_err(|e| format!("{e:#}"))?;
-    let fabric = catalog.fabrics.first().ok_or("The built-in catalog has no fabric.")?;
-    let motion = Motion { mesh: GRID, ..catalog.motion.clone() };
+    let fabric = catalog
+        .fabrics
+        .first()
+        .ok_or("The built-in catalog has no fabric.")?;
+    let motion = Motion {
+        mesh: GRID,
+        ..catalog.motion.clone()
+    };
     let openness = cloth.gap(woven_bsdf::vec3::Vec3::new(0.0, 0.0, 1.0));
     woven_catalog::cloth::spec(fabric, openness, &motion).map_err(|e| format!("{e:#}"))
 }

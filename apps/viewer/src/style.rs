@@ -43,7 +43,13 @@ pub fn dress(ctx: &egui::Context) {
     visuals.slider_trailing_fill = true;
     let radius = CornerRadius::same(4);
     let widgets = &mut visuals.widgets;
-    for w in [&mut widgets.noninteractive, &mut widgets.inactive, &mut widgets.hovered, &mut widgets.active, &mut widgets.open] {
+    for w in [
+        &mut widgets.noninteractive,
+        &mut widgets.inactive,
+        &mut widgets.hovered,
+        &mut widgets.active,
+        &mut widgets.open,
+    ] {
         w.corner_radius = radius;
     }
     widgets.noninteractive.bg_stroke = Stroke::new(1.0, Color32::from_rgb(48, 47, 46));
@@ -54,11 +60,21 @@ pub fn dress(ctx: &egui::Context) {
     ctx.set_visuals_of(Theme::Dark, visuals);
     ctx.global_style_mut(|style| {
         let sized = |size, family| FontId::new(size, family);
-        style.text_styles.insert(TextStyle::Body, sized(13.0, FontFamily::Proportional));
-        style.text_styles.insert(TextStyle::Button, sized(13.0, FontFamily::Proportional));
-        style.text_styles.insert(TextStyle::Small, sized(11.0, FontFamily::Proportional));
-        style.text_styles.insert(TextStyle::Monospace, sized(11.5, FontFamily::Monospace));
-        style.text_styles.insert(TextStyle::Heading, sized(15.0, FontFamily::Proportional));
+        style
+            .text_styles
+            .insert(TextStyle::Body, sized(13.0, FontFamily::Proportional));
+        style
+            .text_styles
+            .insert(TextStyle::Button, sized(13.0, FontFamily::Proportional));
+        style
+            .text_styles
+            .insert(TextStyle::Small, sized(11.0, FontFamily::Proportional));
+        style
+            .text_styles
+            .insert(TextStyle::Monospace, sized(11.5, FontFamily::Monospace));
+        style
+            .text_styles
+            .insert(TextStyle::Heading, sized(15.0, FontFamily::Proportional));
         style.spacing.item_spacing = egui::vec2(7.0, 5.0);
         style.spacing.button_padding = egui::vec2(8.0, 3.0);
         style.spacing.slider_rail_height = 4.0;

@@ -42,7 +42,13 @@ impl View {
             }
             None => {
                 let font = egui::FontId::proportional(14.0);
-                ui.painter().text(area.center(), egui::Align2::CENTER_CENTER, "The curtain is being hung …", font, style::WEAK);
+                ui.painter().text(
+                    area.center(),
+                    egui::Align2::CENTER_CENTER,
+                    "The curtain is being hung …",
+                    font,
+                    style::WEAK,
+                );
             }
         }
         let height = area.height();
@@ -50,8 +56,14 @@ impl View {
         let shift = ui.input(|i| i.modifiers.shift);
         if drag != egui::Vec2::ZERO {
             let pixels = Vec2::new(drag.x, drag.y);
-            let pans = shift || response.dragged_by(egui::PointerButton::Secondary) || response.dragged_by(egui::PointerButton::Middle);
-            *orbit = if pans { orbit.pan(pixels, height) } else { orbit.orbit(pixels, height) };
+            let pans = shift
+                || response.dragged_by(egui::PointerButton::Secondary)
+                || response.dragged_by(egui::PointerButton::Middle);
+            *orbit = if pans {
+                orbit.pan(pixels, height)
+            } else {
+                orbit.orbit(pixels, height)
+            };
         }
         if response.hovered() {
             let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
@@ -75,13 +87,22 @@ fn keys(ui: &Ui, orbit: &mut Orbit, height: f32) {
         // A sixtieth of a half turn a stroke.
         let step = height / 30.0;
         let mut way = Vec2::ZERO;
-        for (key, d) in [(Key::ArrowLeft, Vec2::NEG_X), (Key::ArrowRight, Vec2::X), (Key::ArrowUp, Vec2::NEG_Y), (Key::ArrowDown, Vec2::Y)] {
+        for (key, d) in [
+            (Key::ArrowLeft, Vec2::NEG_X),
+            (Key::ArrowRight, Vec2::X),
+            (Key::ArrowUp, Vec2::NEG_Y),
+            (Key::ArrowDown, Vec2::Y),
+        ] {
             if i.key_pressed(key) {
                 way += d * step;
             }
         }
         if way != Vec2::ZERO {
-            *orbit = if i.modifiers.shift { orbit.pan(way, height) } else { orbit.orbit(way, height) };
+            *orbit = if i.modifiers.shift {
+                orbit.pan(way, height)
+            } else {
+                orbit.orbit(way, height)
+            };
         }
         if i.key_pressed(Key::Plus) || i.key_pressed(Key::Equals) {
             *orbit = orbit.zoom(0.9);

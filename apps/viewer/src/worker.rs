@@ -42,7 +42,12 @@ pub trait Painter: Send + 'static {
     ///
     /// # Errors
     /// A sentence when it cannot.
-    fn pass(&mut self, size: [usize; 2], pass: u32, stop: &AtomicBool) -> Result<Option<Film>, String>;
+    fn pass(
+        &mut self,
+        size: [usize; 2],
+        pass: u32,
+        stop: &AtomicBool,
+    ) -> Result<Option<Film>, String>;
     /// What renders, for the status line.
     fn backend(&self) -> String;
 }
@@ -52,7 +57,12 @@ impl<T: Painter + ?Sized> Painter for Box<T> {
     fn prepare(&mut self, scene: &T::Scene) -> Result<(), String> {
         (**self).prepare(scene)
     }
-    fn pass(&mut self, size: [usize; 2], pass: u32, stop: &AtomicBool) -> Result<Option<Film>, String> {
+    fn pass(
+        &mut self,
+        size: [usize; 2],
+        pass: u32,
+        stop: &AtomicBool,
+    ) -> Result<Option<Film>, String> {
         (**self).pass(size, pass, stop)
     }
     fn backend(&self) -> String {
@@ -89,7 +99,11 @@ impl Picture {
     /// The mean linear radiance of a pixel, by rows from the top; black where there is none.
     #[must_use]
     pub fn pixel(&self, index: usize) -> [f32; 3] {
-        self.film.beauty().and_then(|b| b.get(index)).copied().unwrap_or_default()
+        self.film
+            .beauty()
+            .and_then(|b| b.get(index))
+            .copied()
+            .unwrap_or_default()
     }
 }
 
@@ -123,17 +137,42 @@ pub struct Worker<P: Painter> {
 
 impl<P: Painter> Worker<P> {
     /// Starts the thread. The painter is made in it by `painter`; `wake` is called after each picture.
-    pub fn new(painter: impl FnOnce() -> P + Send + 'static, wake: impl Fn() + Send + 'static) -> Self {
-        let board = Board { wish: None, latest: None, error: None, closing: false };
-        let shared = Arc::new(Shared { board: Mutex::new(board), news: Condvar::new(), stop: AtomicBool::new(false) });
+    pub fn new(
+        painter: impl FnOnce() -> P + Send + 'static,
+        wake: impl Fn() + Send + 'static,
+    ) -> Self {
+        let board = Board {
+            wish: None,
+            latest: None,
+            error: None,
+            closing: false,
+        };
+        let shared = Arc::new(Shared {
+            board: Mutex::new(board),
+            news: Condvar::new(),
+            stop: AtomicBool::new(false),
+        });
         let theirs = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("render".to_owned())
-            .spawn(move || Loop { painter: painter(), shared: theirs, wake: Box::new(wake), rate: 0.0, number: 0 }.run());
+            .spawn(move || {
+                Loop {
+                    painter: painter(),
+                    shared: theirs,
+                    wake: Box::new(wake),
+                    rate: 0.0,
+                    number: 0,
+                }
+                .run()
+            });
         if let Err(e) = &thread {
             shared.board().error = Some(format!("No thread could be started to render in: {e}"));
         }
-        Self { shared, wishes: 0, thread: thread.ok() }
+        Self {
+            shared,
+            wishes: 0,
+            thread: thread.ok(),
+        }
     }
 
     /// Wishes for another picture; what is being rendered is dropped. Returns the wish's number.
@@ -155,7 +194,12 @@ impl<P: Painter> Worker<P> {
     /// The newest picture, if there is one newer than number `seen`.
     #[must_use]
     pub fn newer(&self, seen: u64) -> Option<Picture> {
-        self.shared.board().latest.as_ref().filter(|p| p.number > seen).cloned()
+        self.shared
+            .board()
+            .latest
+            .as_ref()
+            .filter(|p| p.number > seen)
+            .cloned()
     }
 
     /// What went wrong since the last call.
@@ -191,12 +235,17 @@ impl<P: Painter> Loop<P> {
         loop {
             let mut board = shared.board();
             while board.wish.is_none() && !board.closing {
-                board = shared.news.wait(board).unwrap_or_else(PoisonError::into_inner);
+                board = shared
+                    .news
+                    .wait(board)
+                    .unwrap_or_else(PoisonError::into_inner);
             }
             if board.closing {
                 return;
             }
-            let Some((number, since, wish)) = board.wish.take() else { continue };
+            let Some((number, since, wish)) = board.wish.take() else {
+                continue;
+            };
             // From here on, `stop` means that there is a newer wish.
             shared.stop.store(false, Ordering::Release);
             drop(board);
@@ -220,17 +269,34 @@ impl<P: Painter> Loop<P> {
         }
         // A full picture is shown as soon as it has as many samples on the same area as the one before.
         let least = if first > 1 { HALVES.div_ceil(4) } else { 1 };
-        self.stage(number, since, wish, 1, [wish.passes.max(1), least]).map(|_| ())
+        self.stage(number, since, wish, 1, [wish.passes.max(1), least])
+            .map(|_| ())
     }
 
     /// Renders `passes` samples a pixel at a fraction of the size and shows the picture from the `least`-th on; false when
     /// there is a newer wish.
-    fn stage(&mut self, number: u64, since: Instant, wish: &Wish<P::Scene>, coarse: usize, [passes, least]: [u32; 2]) -> Result<bool, String> {
+    fn stage(
+        &mut self,
+        number: u64,
+        since: Instant,
+        wish: &Wish<P::Scene>,
+        coarse: usize,
+        [passes, least]: [u32; 2],
+    ) -> Result<bool, String> {
         let size = wish.size.map(|s| s.max(1).div_ceil(coarse));
         for pass in 0..passes {
-            let Some(film) = self.pass(size, pass)? else { return Ok(false) };
+            let Some(film) = self.pass(size, pass)? else {
+                return Ok(false);
+            };
             if pass + 1 >= least || pass + 1 == passes {
-                self.publish(number, since, size, film, [pass + 1, wish.passes], coarse == 1);
+                self.publish(
+                    number,
+                    since,
+                    size,
+                    film,
+                    [pass + 1, wish.passes],
+                    coarse == 1,
+                );
             }
         }
         Ok(true)
@@ -242,7 +308,9 @@ impl<P: Painter> Loop<P> {
         // Before the first measurement: a third of a million samples a second.
         let rate = if self.rate > 0.0 { self.rate } else { 3e5 };
         let mut coarse = 1;
-        while coarse < COARSEST && full[0].div_ceil(coarse) as f64 * full[1].div_ceil(coarse) as f64 > rate * time {
+        while coarse < COARSEST
+            && full[0].div_ceil(coarse) as f64 * full[1].div_ceil(coarse) as f64 > rate * time
+        {
             coarse *= 2;
         }
         coarse
@@ -250,13 +318,22 @@ impl<P: Painter> Loop<P> {
 
     fn pass(&mut self, size: [usize; 2], pass: u32) -> Result<Option<Film>, String> {
         let begin = Instant::now();
-        let Some(film) = self.painter.pass(size, pass, &self.shared.stop)? else { return Ok(None) };
+        let Some(film) = self.painter.pass(size, pass, &self.shared.stop)? else {
+            return Ok(None);
+        };
         let samples = size[0] * size[1];
         if [film.width, film.height] != size || film.beauty().is_none() {
-            return Err(format!("The renderer gave a picture of {} x {} instead of {} x {}.", film.width, film.height, size[0], size[1]));
+            return Err(format!(
+                "The renderer gave a picture of {} x {} instead of {} x {}.",
+                film.width, film.height, size[0], size[1]
+            ));
         }
         let rate = samples as f64 / begin.elapsed().as_secs_f64().max(1e-6);
-        self.rate = if self.rate > 0.0 { 0.7 * self.rate + 0.3 * rate } else { rate };
+        self.rate = if self.rate > 0.0 {
+            0.7 * self.rate + 0.3 * rate
+        } else {
+            rate
+        };
         Ok(Some(film))
     }
 
@@ -288,96 +365,4 @@ impl<P: Painter> Loop<P> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Paints the scene's number plus the pass's; takes a given time a pixel.
-    struct Slow(f64, Duration);
-
-    impl Painter for Slow {
-        type Scene = f64;
-        fn prepare(&mut self, scene: &f64) -> Result<(), String> {
-            self.0 = *scene;
-            if *scene < 0.0 { Err("The scene is less than nothing.".to_owned()) } else { Ok(()) }
-        }
-        fn pass(&mut self, size: [usize; 2], pass: u32, stop: &AtomicBool) -> Result<Option<Film>, String> {
-            let pixels = size[0] * size[1];
-            let end = Instant::now() + self.1 * pixels as u32;
-            while Instant::now() < end {
-                if stop.load(Ordering::Acquire) {
-                    return Ok(None);
-                }
-                std::thread::sleep(Duration::from_micros(200));
-            }
-            let value = self.0 as f32 + pass as f32;
-            Ok(Some(Film::of_beauty(size[0], size[1], vec![[value; 3]; pixels])))
-        }
-        fn backend(&self) -> String {
-            "slow".to_owned()
-        }
-    }
-
-    fn wait(worker: &Worker<Slow>, until: impl Fn(&Picture) -> bool) -> Picture {
-        let begin = Instant::now();
-        loop {
-            if let Some(p) = worker.newer(0).filter(&until) {
-                return p;
-            }
-            // Ten times what is needed on a busy machine.
-            assert!(begin.elapsed() < Duration::from_secs(20), "no such picture came");
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-
-    #[test]
-    fn passes_are_counted_and_end() {
-        let mut worker = Worker::new(|| Slow(0.0, Duration::ZERO), || ());
-        worker.wish(Wish { scene: 2.0, size: [5, 4], passes: 3 });
-        let done = wait(&worker, |p| p.finished);
-        assert_eq!((done.size, done.passes, done.full), ([5, 4], 3, true));
-        assert_eq!(done.pixel(7), [4.0; 3]);
-    }
-
-    #[test]
-    fn the_first_picture_is_coarse_and_soon() {
-        // 40 000 pixels at 20 µs: 0.8 s for a full pass.
-        let mut worker = Worker::new(|| Slow(0.0, Duration::from_micros(20)), || ());
-        worker.wish(Wish { scene: 1.0, size: [200, 200], passes: 1 });
-        let first = wait(&worker, |_| true);
-        assert!(!first.full && first.size[0] < 200);
-        assert!(first.since < Duration::from_millis(300), "{:?}", first.since);
-        wait(&worker, |p| p.full);
-        // Now that the rate is known the next one is in time, too.
-        let number = worker.wish(Wish { scene: 1.0, size: [200, 200], passes: 1 });
-        let again = wait(&worker, |p| p.wish == number);
-        assert!(again.since < Duration::from_millis(300), "{:?}", again.since);
-    }
-
-    #[test]
-    fn a_newer_wish_stops_the_pass() {
-        // An hour a pass, if it were let.
-        let mut worker = Worker::new(|| Slow(0.0, Duration::from_millis(40)), || ());
-        worker.wish(Wish { scene: 1.0, size: [300, 300], passes: 1 });
-        std::thread::sleep(Duration::from_millis(30));
-        let number = worker.wish(Wish { scene: 7.0, size: [1, 1], passes: 1 });
-        let picture = wait(&worker, |p| p.wish == number);
-        assert_eq!(picture.pixel(0), [7.0; 3]);
-    }
-
-    #[test]
-    fn a_failure_is_told_and_the_next_wish_is_fulfilled() {
-        let mut worker = Worker::new(|| Slow(0.0, Duration::ZERO), || ());
-        worker.wish(Wish { scene: -1.0, size: [2, 2], passes: 1 });
-        let begin = Instant::now();
-        let told = loop {
-            if let Some(told) = worker.error() {
-                break told;
-            }
-            assert!(begin.elapsed() < Duration::from_secs(20));
-            std::thread::sleep(Duration::from_millis(1));
-        };
-        assert_eq!(told, "The scene is less than nothing.");
-        worker.wish(Wish { scene: 3.0, size: [2, 2], passes: 1 });
-        assert_eq!(wait(&worker, |p| p.finished).pixel(3), [3.0; 3]);
-    }
-}
+mod tests;

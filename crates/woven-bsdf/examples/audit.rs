@@ -212,7 +212,7 @@ fn main() -> std::io::Result<()> {
             "Transmittance of the four variants, alpha = 0.3, n = 1.5",
             "incidence, degrees",
             "T",
-            [0.0, 70.0],
+            [0.0, 72.0],
             [0.0, 1.2],
             false,
             &variants,

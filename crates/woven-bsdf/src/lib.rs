@@ -14,6 +14,8 @@
 //! assert!(f > ggx.eval(&[0.1, 0.3, 0.1, 0.1], l, Vec3::new(0.0, 0.0, -1.0)));
 //! ```
 //!
+//! Adding a model is one file and one line; `examples/adding_a_model.rs` is that file for a small one.
+//!
 //! What is absent: no GPU, window, thread or scene; no file format beyond measurements and fabrics.
 
 pub mod angles;

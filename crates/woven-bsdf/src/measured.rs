@@ -4,6 +4,7 @@ pub mod csv;
 pub mod klems;
 pub mod klems_write;
 pub mod shop;
+pub mod table;
 
 /// Why a measurement file was refused; the text says what, where and what to do.
 #[derive(Debug, thiserror::Error)]

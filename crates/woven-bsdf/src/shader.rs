@@ -20,10 +20,16 @@ pub fn generate() -> String {
     out.push_str(&openness());
     for model in MODELS {
         out.push('\n');
-        out.push_str(&format!("// {}: {}\n", model.name, model.equation));
-        for function in [basis(model), pdf(model), sample(model)] {
-            out.push_str(&function);
-        }
+        out.push_str(&functions(model));
+    }
+    out
+}
+
+/// The three functions of one model, with its equation above.
+pub fn functions(model: &ModelInfo) -> String {
+    let mut out = format!("// {}: {}\n", model.name, model.equation);
+    for function in [basis(model), pdf(model), sample(model)] {
+        out.push_str(&function);
     }
     out
 }

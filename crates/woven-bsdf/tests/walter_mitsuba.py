@@ -1,6 +1,6 @@
 """Values of Walter's transmission lobe from an independent implementation, for tests/proofs/published.rs.
 
-    python3 -m venv venv && venv/bin/pip install mitsuba && venv/bin/python walter_mitsuba.py
+    python3 -m venv venv && venv/bin/pip install mitsuba && venv/bin/python walter_mitsuba.py > proofs/walter_mitsuba.csv
 
 Mitsuba 3's `roughdielectric` (GGX, Smith), variant scalar_rgb, in importance mode: no radiance compression, so that its
 value is f |cos theta_v| with the light in air and the viewer in the dense medium. Its arithmetic is single precision.
@@ -13,7 +13,8 @@ import mitsuba as mi
 
 mi.set_variant("scalar_rgb")
 random.seed(7)
-print(f"// mitsuba {mi.__version__}: alpha, n, theta_l, phi_l, theta_v, phi_v in degrees, f in 1/sr")
+print(f"# mitsuba {mi.__version__}, tests/walter_mitsuba.py")
+print("alpha,n,theta_l_deg,phi_l_deg,theta_v_deg,phi_v_deg,f")
 for alpha in (0.1, 0.3, 0.6):
     for n in (1.3, 1.5, 1.8):
         bsdf = mi.load_dict(
@@ -33,4 +34,4 @@ for alpha in (0.1, 0.3, 0.6):
             value = bsdf.eval(ctx, si, wo)[0] / abs(math.cos(c))
             if value > 1e-3:
                 found += 1
-                print(f"    [{alpha}, {n}, {tl!r}, {pl!r}, {tv!r}, {pv!r}, {value!r}],")
+                print(f"{alpha},{n},{tl!r},{pl!r},{tv!r},{pv!r},{value!r}")

@@ -11,4 +11,5 @@ mod reciprocity;
 mod sampling;
 mod shop;
 mod support;
+mod table;
 mod weave;

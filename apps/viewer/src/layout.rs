@@ -52,7 +52,6 @@ impl Viewer {
             .inner;
         self.look_from(orbit, size);
         self.show_chooser(&ctx);
-        // What has changed in this frame is on its way before the frame is shown.
         self.update(&ctx);
     }
 

@@ -20,7 +20,7 @@ pub fn curtain(cloth: &Cloth) -> Result<CurtainSpec, String> {
         .ok_or("The built-in catalog has no fabric.")?;
     let motion = Motion {
         mesh: GRID,
-        ..catalog.motion.clone()
+        ..catalog.motion
     };
     let openness = cloth.gap(woven_bsdf::vec3::Vec3::new(0.0, 0.0, 1.0));
     woven_catalog::cloth::spec(fabric, openness, &motion).map_err(|e| format!("{e:#}"))

@@ -1,6 +1,6 @@
 //! The sliders of the cloth, made from the model's list of parameters: a new parameter needs no line here.
 
-use egui::{Button, ComboBox, Grid, Slider, Ui};
+use egui::{Button, ComboBox, Grid, Slider, SliderClamping, Ui};
 use woven_bsdf::model::{MODELS, Param, Role};
 
 use crate::cloth::Cloth;
@@ -9,7 +9,7 @@ use crate::style;
 /// Width of the name's column and of a slider's rail.
 const NAME: f32 = 76.0;
 /// See [`NAME`].
-const RAIL: f32 = 142.0;
+const RAIL: f32 = 132.0;
 
 /// The tooltip of a parameter: what it means, its unit, its range and the model's equation.
 #[must_use]
@@ -131,6 +131,8 @@ fn row(ui: &mut Ui, cloth: &mut Cloth, index: usize, param: &'static Param) -> b
     ui.spacing_mut().slider_width = RAIL;
     let slider = Slider::new(&mut cloth.values[index], param.min..=param.max)
         .logarithmic(param.log)
+        // A value read from a file keeps its digits until the slider is moved.
+        .clamping(SliderClamping::Edits)
         .max_decimals(4)
         .suffix(if param.unit.is_empty() {
             String::new()

@@ -40,16 +40,17 @@ pub fn smooth(film: &mut Film, levels: u32) {
     };
     let mut light: Vec<[f32; 3]> = beauty.iter().zip(&guides).map(divide).collect();
     tame(&mut light, &guides);
+    let tamed = light.clone();
     for level in 0..levels {
         light = round(&light, &guides, width, height, 1 << level);
     }
-    let picture = beauty
+    let picture = tamed
         .iter()
         .zip(&light)
         .zip(&guides)
         .map(|((old, new), g)| {
             let d = divisor(g);
-            [0, 1, 2].map(|k| old[k] + (new[k] * d[k] - old[k]) * g.share)
+            [0, 1, 2].map(|k| (old[k] + (new[k] - old[k]) * g.share) * d[k])
         });
     film.push(BEAUTY, picture.collect());
 }

@@ -163,7 +163,7 @@ impl<P: Painter> Worker<P> {
                     rate: 0.0,
                     number: 0,
                 }
-                .run()
+                .run();
             });
         if let Err(e) = &thread {
             shared.board().error = Some(format!("No thread could be started to render in: {e}"));

@@ -153,6 +153,23 @@ fn reset_puts_the_sliders_back() {
 }
 
 #[test]
+fn looking_at_a_fabric_does_not_change_it() {
+    let folder = std::env::temp_dir().join(format!("woven-viewer-look-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("there is room");
+    let path = folder.join("odd.toml");
+    let text = "name = \"odd\"\n[optics]\nmodel = \"sheet\"\nparameters = { t_d = 0.123456789, gamma_warp = 0.7654321 }\n";
+    std::fs::write(&path, text).expect("there is room");
+    let mut window = window(Options {
+        fabrics: vec![path],
+        ..quick()
+    });
+    settle(&mut window);
+    assert_eq!(window.state().cloth().values[0], 0.123456789);
+    assert!(!window.state().cloth().changed());
+    std::fs::remove_dir_all(&folder).ok();
+}
+
+#[test]
 fn light_and_wind_restart_the_picture() {
     let mut window = window(quick());
     settle(&mut window);

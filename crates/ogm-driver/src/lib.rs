@@ -24,6 +24,7 @@
 pub mod adaptive;
 pub mod axis;
 pub mod controller;
+pub mod design;
 pub mod detector;
 pub mod error;
 pub mod exposure;

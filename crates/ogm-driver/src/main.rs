@@ -9,12 +9,14 @@ use std::time::Duration;
 use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use ogm_driver::design::Design;
 use ogm_driver::detector::{Detector, SerialPhotodiode};
 use ogm_driver::error::{Error, Result};
 use ogm_driver::external::ExternalDetector;
 use ogm_driver::log::{self, Reading, What};
 use ogm_driver::merge;
-use ogm_driver::plan::Plan;
+use ogm_driver::plan::{Grid, MOST_POSES, Plan};
+use ogm_driver::pose::Pose;
 use ogm_driver::replay;
 use ogm_driver::rig::{Language, Rig};
 use ogm_driver::scan::{self, Watcher};
@@ -23,6 +25,7 @@ use ogm_driver::sim::fabric::FabricSample;
 use ogm_driver::sim::optics::{PlainCloth, Sample};
 use ogm_driver::sim::{Bench, Device, FaultPlan, Imperfections, PtyRig};
 use ogm_driver::transport::StopToken;
+use woven_bsdf::fabric::Fabric;
 
 /// Drives a four-axis goniometer, simulates one, and merges scan logs into measurements.
 #[derive(Parser)]
@@ -109,6 +112,33 @@ enum Command {
         /// Lists the poses in the order of the scan.
         #[arg(long)]
         list: bool,
+    },
+    /// Chooses the poses that tell most about a fabric's parameters, out of a plan's, and writes a plan of them.
+    #[command(
+        after_help = "Example: ogm next --fabric fit.toml --plan crates/ogm-driver/plans/paper.toml --known lace.ogm --count 100 -o more.toml"
+    )]
+    Next {
+        /// The fit so far, as a fabric file.
+        #[arg(long)]
+        fabric: PathBuf,
+        /// The plan whose poses are the choice.
+        #[arg(long)]
+        plan: PathBuf,
+        /// A log whose readings are already known.
+        #[arg(long)]
+        known: Option<PathBuf>,
+        /// How many poses.
+        #[arg(long)]
+        count: usize,
+        /// Count rate of the direct beam, counts a millisecond.
+        #[arg(long, default_value_t = 600_000.0)]
+        beam: f64,
+        /// The rig: shot, grbl, instant, or a TOML file.
+        #[arg(long, default_value = "shot")]
+        rig: String,
+        /// The new plan.
+        #[arg(short, long)]
+        output: PathBuf,
     },
     /// Looks at a scan again without the rig: checks every record against its plan and rig, and recomputes the measurement.
     #[command(after_help = "Example: ogm replay lace.ogm")]
@@ -269,6 +299,49 @@ fn run(command: Command) -> Result<()> {
                 }
             }
             Ok(())
+        }
+        Command::Next {
+            fabric,
+            plan,
+            known,
+            count,
+            beam,
+            rig,
+            output,
+        } => {
+            let (rig, mut plan) = (rig_named(&rig)?, Plan::load(&plan)?);
+            let fabric = Fabric::read(&fabric)
+                .map_err(|e| Error::Plan(format!("The fabric file cannot be used: {e}.")))?;
+            if count == 0 || count > MOST_POSES {
+                return Err(Error::Plan(format!("--count must be 1 to {MOST_POSES}.")));
+            }
+            let known: Vec<Pose> = match known {
+                Some(path) => merge::merge_log(&path)?
+                    .samples
+                    .iter()
+                    .map(|s| s.pose)
+                    .collect(),
+                None => Vec::new(),
+            };
+            let candidates = plan.route(&rig)?.poses;
+            let design = Design::new(&fabric, &rig.detector, &plan.exposure, beam)?;
+            let chosen = design.choose(&candidates, &known, count)?;
+            let all: Vec<Pose> = known.iter().chain(&chosen).copied().collect();
+            for ((name, before), after) in design
+                .names()
+                .iter()
+                .zip(design.errors(&known))
+                .zip(design.errors(&all))
+            {
+                println!("{name}: standard error {before:.3e} before, {after:.3e} after");
+            }
+            plan.name = format!("{}, next {count}", plan.name);
+            plan.grid = Grid::List {
+                poses: chosen.iter().map(Pose::angles).collect(),
+            };
+            let text = toml::to_string(&plan)
+                .map_err(|e| Error::Plan(format!("The plan cannot be written: {e}.")))?;
+            merge::write_whole(&output, text.as_bytes())
         }
         Command::Replay { log: path } => {
             let r = replay::replay(&log::read(&path)?)?;

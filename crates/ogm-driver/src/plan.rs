@@ -300,11 +300,8 @@ impl Adaptive {
                 .collect();
             // Straight through lies on this plane at +theta_l or -theta_l, if at all.
             let turn = (phi_l + 180.0 - plane).rem_euclid(360.0);
-            let straight = if turn < 90.0 || turn > 270.0 {
-                theta_l
-            } else {
-                -theta_l
-            };
+            let opposite = (90.0..=270.0).contains(&turn);
+            let straight = if opposite { -theta_l } else { theta_l };
             for offset in [1.0, 2.0, 4.0, 8.0] {
                 angles.extend([straight - offset, straight + offset]);
             }

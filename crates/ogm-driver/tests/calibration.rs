@@ -1,6 +1,8 @@
 //! Calibration against known truth: drift, dark level, a curved detector, misaligned axes and a wide aperture, and the fabric comes back with error bars
 //! that tell the truth. `OGM_RIGS` sets the number of random rigs (the suite: 30).
 
+mod common;
+
 use std::sync::{Arc, Mutex};
 
 use ogm_driver::merge::{Measurement, merge_log};
@@ -17,7 +19,7 @@ fn measure(rig: &Rig, sample: Arc<dyn Sample>, wrong: Imperfections, plan: &Plan
         Bench::new(rig.clone(), sample, wrong),
         FaultPlan::none(),
     )));
-    let folder = tempfile::tempdir().unwrap();
+    let folder = common::quick_folder();
     let log = folder.path().join("x.ogm");
     scan::run(
         Box::new(MemoryTransport::new(device)),
@@ -235,7 +237,7 @@ fn an_adaptive_plan_sees_a_narrow_peak_with_few_poses() {
 fn an_adaptive_scan_that_was_cut_goes_the_same_way() {
     let plan = Plan::from_toml("straight_through = false\nname = 'a'\n[calibration]\nwhite = false\n[grid]\nkind = 'adaptive'\nplanes = [0, 90]\ntheta_l = [0, 20]").unwrap();
     let rig = Rig::default().with_instant_motors();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = common::quick_folder();
     let session = |log: &str, faults: &[String]| {
         let wrong = Imperfections {
             warm_up_share: 0.0,

@@ -107,7 +107,7 @@ fn kill_9_loses_nothing_doubles_nothing_and_changes_nothing() {
     let undisturbed = export(folder, "whole.ogm");
 
     let mut acknowledged: Vec<usize> = Vec::new();
-    let (mut noise, mut torn, mut killed) = (Noise::at(&[77]), 0, 0);
+    let (mut noise, mut torn, mut killed, mut starved) = (Noise::at(&[77]), 0, 0, 0);
     loop {
         let mut c = child(sim.port(), folder, "cut.ogm");
         let out = BufReader::new(c.stdout.take().unwrap());
@@ -144,8 +144,17 @@ fn kill_9_loses_nothing_doubles_nothing_and_changes_nothing() {
             Some(s) => {
                 let mut text = String::new();
                 std::io::Read::read_to_string(&mut c.stderr.take().unwrap(), &mut text).unwrap();
-                assert!(s.success(), "process {pid}: {text}");
-                break;
+                if s.success() {
+                    break;
+                }
+                // A machine too busy to serve the simulated rig within a second ends a scan as a kill does; a healthy one never.
+                assert!(
+                    text.starts_with("No reply from the rig"),
+                    "process {pid}: {text}"
+                );
+                starved += 1;
+                assert!(starved <= 20, "process {pid}: {text}");
+                continue;
             }
             None => killed += 1,
         }
@@ -192,7 +201,7 @@ fn kill_9_loses_nothing_doubles_nothing_and_changes_nothing() {
         "the measurement differs from the undisturbed one"
     );
     println!(
-        "{killed} kills in {points} points: {} acknowledged, {torn} torn tails, 0 lost, export identical",
+        "{killed} kills in {points} points: {} acknowledged, {torn} torn tails, 0 lost, {starved} starved, export identical",
         acknowledged.len()
     );
     assert!(killed > 0);

@@ -3,6 +3,8 @@
 //!
 //! `OGM_FAULT_SCRIPTS` sets the number of scripts (the suite runs 120).
 
+mod common;
+
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
@@ -227,7 +229,7 @@ fn random_fault_scripts_end_in_a_sentence_and_are_recovered_from() {
         .ok()
         .and_then(|s| s.parse().ok())
         .unwrap_or(120);
-    let folder = tempfile::tempdir().unwrap();
+    let folder = common::quick_folder();
     let mut unharmed = 0;
     let mut sentences = std::collections::BTreeMap::new();
     for script in 0..count {
@@ -247,7 +249,7 @@ fn random_fault_scripts_end_in_a_sentence_and_are_recovered_from() {
 
 #[test]
 fn named_faults_have_their_sentence() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = common::quick_folder();
     for (fault, word) in [
         ("vanish@20", "went away"),
         ("limit@20", "limit sensor stopped"),
@@ -269,7 +271,7 @@ fn named_faults_have_their_sentence() {
 
 #[test]
 fn a_cold_lamp_is_waited_for_and_a_dark_one_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = common::quick_folder();
     let rig = Rig::default().with_instant_motors();
     let log = folder.path().join("x.ogm");
     let cold = device(&rig, 1, FaultPlan::none());
@@ -302,7 +304,7 @@ fn show_a_script() {
         330
     };
     println!("{:?}", FaultPlan::random(script, lines));
-    let folder = tempfile::tempdir().unwrap();
+    let folder = common::quick_folder();
     let first = device(&rig, script, FaultPlan::random(script, lines));
     let (result, _) = session(&first, &rig, &folder.path().join("x.ogm"));
     let journal = first.lock().unwrap().journal.take().unwrap();

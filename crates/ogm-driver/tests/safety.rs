@@ -3,6 +3,8 @@
 //!
 //! `OGM_PLANS` sets the number of plans (the suite: 600).
 
+mod common;
+
 use std::sync::{Arc, Mutex};
 
 use ogm_driver::axis::Axis;
@@ -140,7 +142,7 @@ fn no_byte_on_the_wire_leaves_the_limits_or_enters_the_zone() {
         .ok()
         .and_then(|s| s.parse().ok())
         .unwrap_or(0);
-    let folder = tempfile::tempdir().unwrap();
+    let folder = common::quick_folder();
     let (mut moves, mut done, mut refused) = (0_u64, 0_u64, 0_u64);
     for seed in first..first + count {
         let mut noise = Noise::at(&[seed, 0x7a6f]);

@@ -6,8 +6,8 @@ use super::Value;
 use crate::pose::angle_between;
 use crate::rig::DetectorData;
 
-/// Adds to each value's standard error: slope times the angles' uncertainty (two arms, so √2 of one axis), and what the aperture's blur changes,
-/// R²/8 ∇²f for a round aperture of radius R (the second moment of a disc).
+/// Adds to each value's standard error: slope times the angles' uncertainty (two arms, so √2 of one axis), what the detector arm's error does to the
+/// foreshortening 1/cosθ_v, and what the aperture's blur changes, R²/8 ∇²f for a round aperture of radius R (the second moment of a disc).
 pub(super) fn widen(samples: &mut [Value], detector: &DetectorData) {
     let angle = detector.angle_deg.to_radians() * std::f64::consts::SQRT_2;
     let radius = (detector.aperture_deg / 2.0).to_radians();
@@ -24,7 +24,11 @@ pub(super) fn widen(samples: &mut [Value], detector: &DetectorData) {
         for &i in group {
             let (slope, curvature) = local_shape(&before, group, i);
             let blur = radius * radius / 8.0 * 2.0 * curvature;
-            samples[i].sigma = samples[i].sigma.hypot(slope * angle).hypot(blur);
+            let c = samples[i].pose.view()[2].abs();
+            let tilt = (1.0 - c * c).max(0.0).sqrt() / c.max(1e-3);
+            let foreshortening = samples[i].f * tilt * detector.angle_deg.to_radians();
+            let parts = [slope * angle, foreshortening, blur];
+            samples[i].sigma = parts.into_iter().fold(samples[i].sigma, f64::hypot);
         }
     }
 }

@@ -25,8 +25,11 @@ fn patches() -> Vec<(f64, f64, f64)> {
     out
 }
 
+/// A direction as whole numbers.
+type Key = (i64, i64);
+
 /// Directions as whole hundredths of a degree, so that rounding to pulses does not matter; azimuth 0 at the pole.
-fn key(theta: f64, phi: f64) -> (i64, i64) {
+fn key(theta: f64, phi: f64) -> Key {
     let theta_key = (theta * 100.0).round() as i64;
     let pole = theta_key == 0 || theta_key == 18_000;
     let phi_key = if pole {
@@ -43,7 +46,7 @@ impl Measurement {
     /// # Errors
     /// [`Error::Merge`] telling how many of the pairs were measured when it is not all of them.
     pub fn klems_matrix(&self) -> Result<Vec<f64>> {
-        let mut known: BTreeMap<((i64, i64), (i64, i64)), f64> = BTreeMap::new();
+        let mut known: BTreeMap<(Key, Key), f64> = BTreeMap::new();
         for s in &self.samples {
             let p = &s.pose;
             known.insert((key(p.theta_l, p.phi_l), key(p.theta_v, p.phi_v)), s.f);

@@ -88,9 +88,9 @@ impl Progress {
     /// Writes a line above the bar; on stderr when there is no bar.
     pub fn line(&self, text: &str) {
         if self.bar.is_hidden() {
-            eprintln!("{text}")
+            eprintln!("{text}");
         } else {
-            self.bar.println(text)
+            self.bar.println(text);
         }
     }
 

@@ -20,7 +20,7 @@ const LARGEST: (u32, u32) = (3840, 2160);
 /// A sentence for the user.
 pub fn check_size(width: u32, height: u32) -> Result<()> {
     ensure!(
-        width % 2 == 0 && height % 2 == 0,
+        width.is_multiple_of(2) && height.is_multiple_of(2),
         "{width}x{height} has an odd side; a video needs even ones, for example 640x480."
     );
     ensure!(

@@ -29,7 +29,7 @@ measurement = "cloth.csv"
 "#;
 
 /// Writes `tiny.toml` and its measurement into `folder`: a diffuse cloth, 8 % open, seen from 30 directions at two incidences.
-pub fn catalog(folder: &Path) {
+pub(crate) fn catalog(folder: &Path) {
     fs::write(folder.join("tiny.toml"), CATALOG).unwrap();
     let mut csv = String::from(
         "# made by formula for a test\n# direct,0,0,0.08,0.001\n# direct,30,0,0.06,0.001\ntheta_l_deg,phi_l_deg,theta_v_deg,phi_v_deg,f,sigma\n",
@@ -45,24 +45,25 @@ pub fn catalog(folder: &Path) {
 }
 
 /// `woven-catalog` with these words, started in `folder`.
-pub fn command(folder: &Path, words: &[&str]) -> Command {
+pub(crate) fn command(folder: &Path, words: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_woven-catalog"));
     command.current_dir(folder).args(words);
     command
 }
 
 /// Runs it to its end.
-pub fn run(folder: &Path, words: &[&str]) -> Output {
+pub(crate) fn run(folder: &Path, words: &[&str]) -> Output {
     command(folder, words).output().unwrap()
 }
 
 /// What it said on stderr.
-pub fn said(output: &Output) -> String {
+pub(crate) fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+#[allow(dead_code, reason = "each test program uses its part of this file")]
 /// All files below `folder` by their relative names.
-pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     fn visit(root: &Path, folder: &Path, out: &mut BTreeMap<String, Vec<u8>>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();

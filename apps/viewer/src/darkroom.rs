@@ -74,8 +74,8 @@ pub fn develop(film: &Film, recipe: Recipe) -> Vec<u8> {
     }
     let mut film = film.clone();
     if recipe.samples < ENOUGH {
-        // One round less for each doubling of the samples.
-        smooth(&mut film, 5 - recipe.samples.max(1).ilog2());
+        // Half the width, a round less, for four times the samples.
+        smooth(&mut film, 5 - recipe.samples.max(1).ilog2() / 2);
     } else {
         denoise(
             &mut film,

@@ -86,7 +86,8 @@ fn guides(film: &Film) -> Option<Vec<Guide>> {
         albedo: albedo[i],
         normal: normal[i],
         depth: depth[i][0],
-        share: (1.0 - 2.0 * gap[i][0]).clamp(0.0, 1.0),
+        // Through a gap of a tenth and less the background is too faint to be missed in a first picture.
+        share: (1.25 - 2.5 * gap[i][0]).clamp(0.0, 1.0),
     };
     Some((0..film.width * film.height).map(guide).collect())
 }

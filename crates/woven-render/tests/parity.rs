@@ -1,7 +1,7 @@
 //! CPU and GPU make the same picture from the same random numbers.
 //!
-//! Seen to fail: with `gap_at` in shader/surface.wgsl returning 0, and with `product *= gap` in shader/bvh.wgsl left
-//! out, every test below is red.
+//! Seen to fail: with `product *= gap * 0.97` in shader/bvh.wgsl the first test reports a mean FLIP of 0.018 and 35 %
+//! of the pixels within 1e-3, where the whole shader gives 0.00001 and 100 %.
 
 mod common;
 
@@ -29,8 +29,8 @@ fn lace() -> Material {
 
 fn settings(spp: u32) -> Settings {
     Settings {
-        width: 48,
-        height: 36,
+        width: 32,
+        height: 24,
         spp,
         seed: 3,
         ..Settings::default()
@@ -89,7 +89,7 @@ fn compare(name: &str, scene: &Scene, settings: &Settings, pixels: f64, means: f
 /// Rounding differs (fused multiplications), so that now and then a ray just misses what the other one hits, or a
 /// coin falls otherwise. Such a path changes one pixel by a sample's worth.
 const PIXELS: f64 = 0.98;
-/// The issue asks for 0.2 %; the strays of a 48 x 36 picture leave some 1e-4.
+/// The issue asks for 0.2 %; the strays of a 32 x 24 picture leave some 1e-4.
 const MEANS: f64 = 1e-3;
 
 #[test]

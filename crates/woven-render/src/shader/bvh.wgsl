@@ -32,7 +32,13 @@ fn ray_new(o: vec3<f32>, d: vec3<f32>) -> Ray {
 
 struct Boxes {
     near: vec4<f32>,
-    hit: vec4<bool>,
+    // Bits of the lanes that are met.
+    hit: u32,
+}
+
+// Bits of the lanes that are true.
+fn bits(lanes: vec4<bool>) -> u32 {
+    return dot(select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), lanes), vec4<u32>(1u));
 }
 
 fn boxes(n: u32, ray: Ray, tmax: f32) -> Boxes {
@@ -50,14 +56,15 @@ fn boxes(n: u32, ray: Ray, tmax: f32) -> Boxes {
         min(select(bx, ax, ray.inv.x < 0.0), select(by, ay, ray.inv.y < 0.0)),
         min(select(bz, az, ray.inv.z < 0.0), vec4<f32>(tmax)),
     );
-    return Boxes(near, near <= far);
+    return Boxes(near, bits(near <= far));
 }
 
 struct Four {
     t: vec4<f32>,
     u: vec4<f32>,
     v: vec4<f32>,
-    hit: vec4<bool>,
+    // Bits of the lanes that are met.
+    hit: u32,
 }
 
 fn triangles(p: u32, ray: Ray, tmin: f32, tmax: f32) -> Four {
@@ -86,7 +93,7 @@ fn triangles(p: u32, ray: Ray, tmin: f32, tmax: f32) -> Four {
     let t = (e2x * qx + e2y * qy + e2z * qz) * inv;
     let inside = (u >= vec4<f32>(0.0)) & (v >= vec4<f32>(0.0)) & ((u + v) <= vec4<f32>(1.0));
     let between = (t > vec4<f32>(tmin)) & (t < vec4<f32>(tmax));
-    return Four(t, u, v, inside & between);
+    return Four(t, u, v, bits(inside & between));
 }
 
 // The nearest hit between tmin and tmax; its place is EMPTY when there is none.
@@ -104,8 +111,11 @@ fn nearest(ray: Ray, tmin: f32, tmax: f32) -> Hit {
         if ((child & LEAF) != 0u) {
             let packet = child & ~LEAF;
             let four = triangles(packet, ray, tmin, hit.t);
-            for (var lane = 0u; lane < 4u; lane++) {
-                if (four.hit[lane] && four.t[lane] < hit.t) {
+            var mask = four.hit;
+            while (mask != 0u) {
+                let lane = firstTrailingBit(mask);
+                mask &= mask - 1u;
+                if (four.t[lane] < hit.t) {
                     hit = Hit(four.t[lane], packet * 4u + lane, four.u[lane], four.v[lane]);
                 }
             }
@@ -113,10 +123,10 @@ fn nearest(ray: Ray, tmin: f32, tmax: f32) -> Hit {
         }
         let b = boxes(child, ray, hit.t);
         let base = top;
-        for (var lane = 0u; lane < 4u; lane++) {
-            if (!b.hit[lane]) {
-                continue;
-            }
+        var mask = b.hit;
+        while (mask != 0u) {
+            let lane = firstTrailingBit(mask);
+            mask &= mask - 1u;
             let entry = b.near[lane];
             var at = top;
             while (at > base && entries[at - 1u] < entry) {
@@ -142,18 +152,19 @@ fn transmittance(ray: Ray, tmax: f32, rng: ptr<function, Rng>) -> f32 {
         let child = stack[top];
         if ((child & LEAF) == 0u) {
             let b = boxes(child, ray, tmax);
-            for (var lane = 0u; lane < 4u; lane++) {
-                if (b.hit[lane]) {
-                    stack[top] = nodes[child].child[lane];
-                    top += 1u;
-                }
+            var mask = b.hit;
+            while (mask != 0u) {
+                let lane = firstTrailingBit(mask);
+                mask &= mask - 1u;
+                stack[top] = nodes[child].child[lane];
+                top += 1u;
             }
             continue;
         }
         let packet = child & ~LEAF;
         let four = triangles(packet, ray, 0.0, tmax);
         // One copy of the code for the four lanes: what is asked of a sheet is long.
-        var mask = dot(select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), four.hit), vec4<u32>(1u));
+        var mask = four.hit;
         while (mask != 0u) {
             let lane = firstTrailingBit(mask);
             mask &= mask - 1u;

@@ -113,11 +113,8 @@ impl Anchor {
     /// For a file; read back by [`Self::from_bytes`].
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        self.pixels
-            .iter()
-            .flatten()
-            .flat_map(|v| v.to_le_bytes())
-            .collect()
+        let numbers = std::iter::once(&self.rest).chain(self.pixels.iter().flatten());
+        numbers.flat_map(|v| v.to_le_bytes()).collect()
     }
 
     /// Reads a file.

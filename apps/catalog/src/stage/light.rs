@@ -44,7 +44,7 @@ impl Preset {
     #[must_use]
     pub const fn exposure(self) -> f32 {
         match self {
-            Self::Day | Self::All => 2.3,
+            Self::Day | Self::All => 2.0,
             Self::Evening => 2.4,
         }
     }

@@ -33,30 +33,75 @@ fn the_rig_gives_the_cloth_back() {
     let cloth = Arc::new(sim::fabric::FabricSample::new(&fabric).expect("it can be measured"));
     let bench = sim::Bench::new(rig.clone(), cloth, sim::Imperfections::default());
     let device = Arc::new(Mutex::new(sim::Device::new(bench, sim::FaultPlan::none())));
-    let plan = Plan::from_toml(&PLAN.replace("\n    [grid]", "\n    forbidden = \"leave-out\"\n    [grid]")).expect("a plan");
+    let plan = Plan::from_toml(&PLAN.replace(
+        "\n    [grid]",
+        "\n    forbidden = \"leave-out\"\n    [grid]",
+    ))
+    .expect("a plan");
     let log = folder.path().join("scan.ogm");
     let transport = Box::new(sim::MemoryTransport::new(device));
-    let outcome = scan::run(transport, &rig, &plan, &log, &StopToken::new(), &mut scan::Quiet).expect("a scan");
+    let outcome = scan::run(
+        transport,
+        &rig,
+        &plan,
+        &log,
+        &StopToken::new(),
+        &mut scan::Quiet,
+    )
+    .expect("a scan");
     assert_eq!(outcome.stored, outcome.points);
-    assert!(outcome.points > 100, "only {} poses were allowed", outcome.points);
+    assert!(
+        outcome.points > 100,
+        "only {} poses were allowed",
+        outcome.points
+    );
 
     let csv = folder.path().join("lace.csv");
-    merge::merge_log(&log).expect("it merges").write_csv(&csv).expect("it is written");
+    merge::merge_log(&log)
+        .expect("it merges")
+        .write_csv(&csv)
+        .expect("it is written");
 
-    let options = Options { models: Some(vec!["sheet".into()]), ..Options::default() };
+    let options = Options {
+        models: Some(vec!["sheet".into()]),
+        ..Options::default()
+    };
     let result = fit_measurement(&csv, &options, &quiet).expect("it fits");
     let sheet = &result.ranking[0];
-    println!("{:<12} {:>8} {:>10} {:>10}", "parameter", "truth", "fitted", "std err");
+    println!(
+        "{:<12} {:>8} {:>10} {:>10}",
+        "parameter", "truth", "fitted", "std err"
+    );
     for p in &sheet.parameters {
-        let Some(&truth) = fabric.optics.parameters.get(p.name) else { continue };
+        let Some(&truth) = fabric.optics.parameters.get(p.name) else {
+            continue;
+        };
         let error = p.standard_error.unwrap_or(f64::NAN);
-        println!("{:<12} {truth:>8.4} {:>10.4} {error:>10.5}", p.name, p.value);
+        println!(
+            "{:<12} {truth:>8.4} {:>10.4} {error:>10.5}",
+            p.name, p.value
+        );
         // The detector's 1° aperture is not in a pose's value and the straight-through pose is a flux, so a bias of a
         // few parts in a thousand may stand beside the noise: 1 % is allowed, or three standard errors.
         let allowed = (0.01 * truth).max(if error.is_finite() { 3.0 * error } else { 0.0 });
-        assert!((p.value - truth).abs() <= allowed, "{}: {} instead of {truth} ± {error}", p.name, p.value);
+        assert!(
+            (p.value - truth).abs() <= allowed,
+            "{}: {} instead of {truth} ± {error}",
+            p.name,
+            p.value
+        );
     }
-    for name in ["t_d", "k_t", "alpha_x", "alpha_y", "gamma_warp", "gamma_weft"] {
-        assert!(sheet.parameters.iter().any(|p| p.name == name), "{name} was not fitted");
+    for name in [
+        "t_d",
+        "k_t",
+        "alpha_x",
+        "alpha_y",
+        "gamma_warp",
+        "gamma_weft",
+    ] {
+        assert!(
+            sheet.parameters.iter().any(|p| p.name == name),
+            "{name} was not fitted"
+        );
     }
 }

@@ -119,7 +119,7 @@ fn guides(film: &Film) -> Vec<Guide> {
                 } else {
                     0.0
                 }
-            })
+            });
         });
     }
     if let Some(l) = film.layer("normal") {

@@ -309,7 +309,7 @@ fn fits(view: &Value, offset: u64, size: u64, align: u64, count: u64) -> Result<
         "an element has {size} bytes, but the bufferView's stride is {stride}"
     );
     ensure!(
-        stride % align == 0 && offset % align == 0,
+        stride.is_multiple_of(align) && offset.is_multiple_of(align),
         "its elements are not aligned to their {align} bytes"
     );
     let end = offset + stride * (count - 1) + size;

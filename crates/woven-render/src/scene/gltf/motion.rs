@@ -439,7 +439,7 @@ impl Data<'_> {
             out.extend(
                 e.chunks_exact(4)
                     .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-            )
+            );
         })?;
         ensure!(
             shape.component == 5126,
@@ -463,7 +463,7 @@ impl Data<'_> {
     fn indices(&self, index: u64) -> Result<Vec<u32>> {
         let mut out = Vec::new();
         self.elements(index, |e| {
-            out.push(e.iter().rev().fold(0_u32, |n, b| (n << 8) | u32::from(*b)))
+            out.push(e.iter().rev().fold(0_u32, |n, b| (n << 8) | u32::from(*b)));
         })?;
         Ok(out)
     }

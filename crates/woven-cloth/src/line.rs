@@ -71,10 +71,6 @@ impl Block {
     }
 
     /// One exact solve of the linearised constraints of a thread of `n` vertices.
-    #[expect(
-        clippy::needless_range_loop,
-        reason = "fixed-size loops over lanes become vector instructions"
-    )]
     pub(crate) fn solve(&mut self, n: usize, springs: &Springs) {
         let Springs {
             rest,

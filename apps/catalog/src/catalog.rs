@@ -166,16 +166,6 @@ impl Default for Picture {
 }
 
 impl Picture {
-    /// Paths a pixel of a frame in a light: lamps leave less noise than sun and sky.
-    #[must_use]
-    pub fn samples_in(&self, light: Preset) -> u32 {
-        if light == Preset::Evening {
-            (self.samples * 2).div_ceil(3)
-        } else {
-            self.samples
-        }
-    }
-
     /// Paths a pixel of the light desk's pictures.
     #[must_use]
     pub fn desk_samples(&self) -> u32 {

@@ -417,7 +417,7 @@ impl<'a> Run<'a> {
         let progress = &self.progress;
         let taken = set.still(
             &cloth::mesh(&subject.clip, None),
-            picture.samples_in(light),
+            picture.samples,
             picture.still_samples,
             &mut |share| {
                 progress.show(share * work);
@@ -468,7 +468,7 @@ impl<'a> Run<'a> {
                     frame + 1,
                     self.catalog.motion.frames
                 ));
-                (Some(frame as usize), picture.samples_in(light))
+                (Some(frame as usize), picture.samples)
             }
         };
         let progress = &self.progress;
@@ -586,7 +586,7 @@ fn shots(catalog: &Catalog) -> Vec<(usize, Shot)> {
                     subject,
                     kind: Kind::Frame(light, n),
                     name: frame_name(&fabric.id, light, n),
-                    work: work(catalog, picture.samples_in(light)),
+                    work: work(catalog, picture.samples),
                 });
             }
         }

@@ -179,7 +179,7 @@ fn left(started: Instant, done: usize, of: usize) -> String {
         return String::new();
     }
     let seconds = started.elapsed().as_secs_f64() / done as f64 * (of - done) as f64;
-    format!(", {:.0} s left in all", seconds)
+    format!(", {seconds:.0} s left in all")
 }
 
 fn file_name(k: usize, format: &str) -> String {

@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 
 /// A GLB from its JSON and binary chunk.
-pub fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
+pub(crate) fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
     let mut text = serde_json::to_vec(json).unwrap();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut bin = bin.to_vec();
@@ -20,7 +20,7 @@ pub fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
 }
 
 /// A 2 x 2 PNG: red, green / blue, half-transparent white.
-pub fn tiny_png() -> Vec<u8> {
+pub(crate) fn tiny_png() -> Vec<u8> {
     use image::ImageEncoder;
     let mut out = Vec::new();
     let pixels = [
@@ -34,7 +34,7 @@ pub fn tiny_png() -> Vec<u8> {
 
 /// One square metre at z = 0 that faces +Z, textured, with two morph targets and a sparse copy of its positions, under
 /// a child node, with a camera at z = 3, a point light and an animation. Uses most of what the reader knows.
-pub fn scene() -> (Value, Vec<u8>) {
+pub(crate) fn scene() -> (Value, Vec<u8>) {
     let mut bin = Vec::new();
     let mut views = Vec::new();
     let mut add = |bytes: &[u8]| {

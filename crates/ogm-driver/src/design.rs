@@ -195,7 +195,6 @@ fn update(inverse: &mut [f64], j: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Plan;
 
     fn design() -> Design {
         let fabric = Fabric::from_toml("name = 'g'\n[optics]\nmodel = 'ggx-mirrored'\nparameters = { k_d = 0.2, k_t = 0.3, alpha_x = 0.06, alpha_y = 0.1 }").unwrap();
@@ -206,39 +205,6 @@ mod tests {
             6e5,
         )
         .unwrap()
-    }
-
-    /// Two planes of 200 poses each.
-    fn grid() -> Vec<Pose> {
-        let text = "name = 'g'\n[grid]\nkind = 'uniform'\ntheta_l = [0]\nphi_l = [0]\ntheta_v = { from = 100, to = 178, step = 0.78787878 }\nphi_v = [0, 90, 180, -90]";
-        Plan::from_toml(text).unwrap().grid.poses().unwrap()
-    }
-
-    #[test]
-    fn half_of_the_readings_give_the_same_intervals() {
-        let (design, grid) = (design(), grid());
-        assert_eq!(grid.len(), 400);
-        let all = design.errors(&grid);
-        let chosen = design.choose(&grid, &[], 200).unwrap();
-        let half = design.errors(&chosen);
-        println!(
-            "{:?}: 400 on the grid {all:?}, 200 chosen {half:?}",
-            design.names()
-        );
-        // The widths, for which one measures; the floor k_d is what a grid tells best.
-        let at = |name: &str| design.names().iter().position(|n| *n == name).unwrap();
-        for name in ["alpha_x", "alpha_y"] {
-            assert!(half[at(name)] <= all[at(name)], "{name}: {half:?} {all:?}");
-        }
-        // And half of the grid itself does not do it.
-        let every_other: Vec<Pose> = grid.iter().copied().step_by(2).collect();
-        assert!(
-            design
-                .errors(&every_other)
-                .iter()
-                .zip(&all)
-                .all(|(h, a)| h > a)
-        );
     }
 
     #[test]

@@ -129,7 +129,7 @@ impl Default for Motion {
             wind: 1.6,
             gusts: 0.5,
             seed: 7,
-            mesh: [112, 72],
+            mesh: [96, 60],
         }
     }
 }

@@ -29,6 +29,7 @@
 pub mod convert;
 pub mod figures;
 pub mod fit;
+pub mod identify;
 pub mod info;
 pub mod linalg;
 pub mod measurement;
@@ -41,5 +42,6 @@ pub mod search;
 pub mod solve;
 pub mod starts;
 mod summary;
+pub mod synth;
 pub mod text;
 pub mod uncertainty;

@@ -3,6 +3,11 @@
 //! Matrices are column-major slices. The systems here have up to tens of thousands of rows and at most a
 //! dozen columns, so plain loops over columns are as fast as anything and always give the same bytes.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "matrix indices read like the algorithms' papers"
+)]
+
 /// Dot product with eight running sums: fast, and the same bits for the same input.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];

@@ -208,6 +208,11 @@ impl Spec {
         }
     }
 
+    /// Only the named parameters; shapes not named stand at their start values, factors not named at zero.
+    pub fn only(model: &'static ModelInfo, names: &[&str]) -> Self {
+        Self::with(model, |name| !names.contains(&name), false)
+    }
+
     /// Ties alpha_x to alpha_y: the isotropic version of an anisotropic lobe; `None` if there is no such pair.
     pub fn isotropic(&self) -> Option<Self> {
         let find = |suffix: &str| {

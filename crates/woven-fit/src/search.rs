@@ -166,10 +166,25 @@ fn search(
             }
         };
         if cost(rival) < cost(&found[0].1) {
-            return (rival.clone(), agreeing);
+            return (ordered(spec, rival.clone()), agreeing);
         }
     }
-    (found.swap_remove(0).1, agreeing)
+    (ordered(spec, found.swap_remove(0).1), agreeing)
+}
+
+/// Two lobes of one kind fit as well with their names exchanged: the broad one of `hgf` is called g_d.
+fn ordered(spec: &Spec, mut x: Vec<f64>) -> Vec<f64> {
+    let find = |name: &str| spec.coordinates.iter().position(|c| c.name == name);
+    if let (Some(d), Some(s)) = (find("g_d"), find("g_s"))
+        && x[d] > x[s]
+    {
+        x.swap(d, s);
+        for c in [d, s] {
+            let (lo, hi) = spec.range(c);
+            x[c] = x[c].clamp(lo, hi);
+        }
+    }
+    x
 }
 
 /// Gap and scattering in turn; then one Jacobian with each row counting for what it decides.

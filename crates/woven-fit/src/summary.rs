@@ -100,6 +100,7 @@ pub(crate) fn summary(
         Outcome::Converged => "converged".to_owned(),
         Outcome::OutOfPatience => "out of patience".to_owned(),
         Outcome::Degenerate { .. } => "degenerate".to_owned(),
+        Outcome::Stuck => "stuck at a kink".to_owned(),
         Outcome::NotFinite => "not finite".to_owned(),
     };
     let mut fit = ModelFit {

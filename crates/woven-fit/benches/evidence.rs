@@ -129,7 +129,7 @@ fn global() {
                     0.01,
                     seed,
                 ));
-                let mut cost = |x: &[f64]| {
+                let cost = |x: &[f64]| {
                     let mut problem = Separable::new(
                         Evaluator {
                             spec: &spec,

@@ -5,10 +5,6 @@
 //! some combination of parameters changes nothing that was measured: it is named, and no error bar is given for the
 //! parameters in it.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "matrix indices read like the algorithms' papers"
-)]
 
 use crate::linalg::{PivotedR, norm};
 use nalgebra::DMatrix;

@@ -5,7 +5,6 @@
 //! some combination of parameters changes nothing that was measured: it is named, and no error bar is given for the
 //! parameters in it.
 
-
 use crate::linalg::{PivotedR, norm};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};

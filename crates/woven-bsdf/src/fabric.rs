@@ -21,6 +21,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// What the name of a colour ends in that belongs to the side away from +z.
+const BACK: &str = "_back";
+
 /// A fabric file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -69,7 +72,9 @@ pub struct OpticsTable {
     /// Its parameters; those left out have the model's start values (linear factors: 0).
     #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
-    /// Linear Rec. 709 colours that multiply linear factors.
+    /// Linear Rec. 709 colours that multiply linear factors. A reflection factor of the sheet may have a second one for
+    /// the side away from +z, under its name and `_back`: `r_d_back = [...]`. Transmission has none: light takes the same
+    /// way from both sides.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub colors: BTreeMap<String, [f64; 3]>,
 }
@@ -111,11 +116,25 @@ impl Fabric {
         toml::to_string_pretty(self).expect("names and numbers always print")
     }
 
-    /// The optics with parameters checked, coloured and prepared.
+    /// The optics with parameters checked, coloured and prepared, for light and viewer on the face.
     ///
     /// # Errors
     /// A sentence when the model or a parameter is unknown or out of its range.
     pub fn optics(&self) -> Result<Optics, Refused> {
+        // Both sides must be sound when a file is read.
+        self.side(BACK)?;
+        self.side("")
+    }
+
+    /// [`Fabric::optics`] of the other side: reflection has the colours with `_back` where there are any.
+    ///
+    /// # Errors
+    /// As [`Fabric::optics`].
+    pub fn optics_back(&self) -> Result<Optics, Refused> {
+        self.side(BACK)
+    }
+
+    fn side(&self, suffix: &str) -> Result<Optics, Refused> {
         let table = &self.optics;
         let model = model::find(&table.model).ok_or_else(|| {
             let names: Vec<_> = model::MODELS.iter().map(|m| m.name).collect();
@@ -125,8 +144,19 @@ impl Fabric {
                 names.join(", ")
             ))
         })?;
-        for name in table.parameters.keys().chain(table.colors.keys()) {
-            if !model.params.iter().any(|p| p.name == name) {
+        let color_of = |key: &String| match key.strip_suffix(BACK) {
+            Some(name) if ["r_d", "k_r"].contains(&name) => name.to_owned(),
+            _ => key.clone(),
+        };
+        let colored = table.colors.keys().map(color_of);
+        for name in &table
+            .parameters
+            .keys()
+            .cloned()
+            .chain(colored)
+            .collect::<Vec<_>>()
+        {
+            if !model.params.iter().any(|p| p.name == *name) {
                 let names: Vec<_> = model.params.iter().map(|p| p.name).collect();
                 return Err(Refused::new(format!(
                     "{} has no parameter {name:?}; it has {}",
@@ -155,7 +185,11 @@ impl Fabric {
                 shape.push(x);
                 continue;
             }
-            let color = table.colors.get(p.name).copied().unwrap_or([1.0; 3]);
+            let own = table.colors.get(&format!("{}{suffix}", p.name));
+            let color = own
+                .or(table.colors.get(p.name))
+                .copied()
+                .unwrap_or([1.0; 3]);
             if color.iter().any(|c| !(0.0..=1e3).contains(c)) {
                 return Err(Refused::new(format!(
                     "the colour of {} is {color:?}; each channel must be 0 or more",

@@ -4,6 +4,8 @@
 //! `name_sample(s, w, wo, u)` with `s: array<f32, 16>` the prepared shape and `w: array<f32, 8>` the weights; and
 //! `openness(gamma_warp, gamma_weft, section, w)`. The text is checked in; a test prints it again and compares.
 
+pub mod parity;
+
 use crate::model::{MAX_LINEAR, MAX_SHAPE, MODELS, ModelInfo};
 use crate::trace::{Rec, record, wgsl};
 use crate::vec3::Vec3;
@@ -55,7 +57,7 @@ impl Inputs {
     }
 }
 
-fn identifier(model: &ModelInfo) -> String {
+pub(crate) fn identifier(model: &ModelInfo) -> String {
     model.name.replace('-', "_")
 }
 

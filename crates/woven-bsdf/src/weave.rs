@@ -1,7 +1,9 @@
 //! The gap: how much of the light passes between the yarns, for every direction; and drafts of weaves.
 
 pub mod draft;
+pub mod map;
 pub mod wif;
+pub mod yarns;
 
 use crate::real::Real;
 use crate::term::albedo::GAUSS8;

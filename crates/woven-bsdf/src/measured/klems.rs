@@ -5,7 +5,8 @@
 //! is the straight-through one: in the cloth's frame (seen from the front) l = (-sinθ cosφ, -sinθ sinφ, cosθ) and the
 //! transmitted v = (sinθ cosφ, sinθ sinφ, -cosθ), the mirror-reflected v = (sinθ cosφ, sinθ sinφ, cosθ).
 
-use super::{Refused, read_text};
+use super::xml::{find, is, number, text};
+use super::{Refused, klems_check, read_text, tensor_tree};
 use crate::angles::radians;
 use crate::vec3::Vec3;
 use roxmltree::Node;
@@ -153,21 +154,18 @@ impl Klems {
     ///
     /// # Errors
     /// As [`Klems::read`].
-    pub fn parse(text: &str) -> Result<Self, Refused> {
-        let doc = roxmltree::Document::parse(text).map_err(|e| {
+    pub fn parse(xml: &str) -> Result<Self, Refused> {
+        let doc = roxmltree::Document::parse(xml).map_err(|e| {
             Refused::new(format!(
                 "the XML is broken or cut off ({e}); fetch the file again"
             ))
         })?;
         let root = doc.root_element();
-        let text_of = |tag: &str| {
-            find(root, tag)
-                .and_then(|n| n.text())
-                .map(|t| t.trim().to_owned())
-                .unwrap_or_default()
-        };
-        match text_of("IncidentDataStructure").as_str() {
+        match text(root, "IncidentDataStructure") {
             "Columns" => {}
+            "TensorTree3" | "TensorTree4" => {
+                return Ok(tensor_tree::TensorTree::of_root(root)?.to_klems());
+            }
             "" => {
                 return Err(Refused::new(
                     "there is no IncidentDataStructure: this is not a Klems BSDF file",
@@ -175,51 +173,30 @@ impl Klems {
             }
             other => {
                 return Err(Refused::new(format!(
-                    "IncidentDataStructure is {other:?}; only Columns is known"
+                    "IncidentDataStructure is {other:?}; only Columns and TensorTree3 or 4 are known"
                 )));
             }
         }
         let patches = patches(root)?;
         let mut blocks = Vec::new();
-        for data in root
-            .descendants()
-            .filter(|n| n.has_tag_name_local("WavelengthData"))
-        {
-            let band = find(data, "Wavelength")
-                .and_then(|n| n.text())
-                .unwrap_or("Visible")
-                .trim()
-                .to_owned();
-            for block in data
-                .descendants()
-                .filter(|n| n.has_tag_name_local("WavelengthDataBlock"))
-            {
-                let direction = find(block, "WavelengthDataDirection")
-                    .and_then(|n| n.text())
-                    .unwrap_or("");
-                let kind = Kind::parse(direction).ok_or_else(|| {
-                    Refused::new(format!("unknown WavelengthDataDirection {direction:?}"))
-                })?;
-                let numbers = find(block, "ScatteringData")
-                    .and_then(|n| n.text())
-                    .unwrap_or("");
-                let values = matrix(numbers, patches.len(), &format!("{band}, {}", kind.name()))?;
-                blocks.push(Block {
-                    band: band.clone(),
-                    kind,
-                    values,
-                });
-            }
+        let basis = text(root, "AngleBasisName");
+        for (band, kind, block) in data_blocks(root)? {
+            let whose = format!("{band}, {}", kind.name());
+            klems_check::bases(block, basis, &whose)?;
+            let values = matrix(text(block, "ScatteringData"), patches.len(), &whose)?;
+            blocks.push(Block { band, kind, values });
         }
         if blocks.is_empty() {
             return Err(Refused::new("the file holds no scattering data"));
         }
-        Ok(Klems {
-            name: text_of("Name"),
-            manufacturer: text_of("Manufacturer"),
+        let file = Klems {
+            name: text(root, "Name").to_owned(),
+            manufacturer: text(root, "Manufacturer").to_owned(),
             patches,
             blocks,
-        })
+        };
+        klems_check::orientation(&file)?;
+        Ok(file)
     }
 
     /// The block of a band ("Visible", "Solar") and kind.
@@ -251,38 +228,33 @@ impl Klems {
     }
 }
 
-/// `has_tag_name` without the namespace, which files spell in several ways.
-trait LocalName {
-    fn has_tag_name_local(&self, name: &str) -> bool;
-}
-impl LocalName for Node<'_, '_> {
-    fn has_tag_name_local(&self, name: &str) -> bool {
-        self.is_element() && self.tag_name().name() == name
+/// Band, kind and element of every block of data.
+pub(super) fn data_blocks<'a, 'i>(
+    root: Node<'a, 'i>,
+) -> Result<Vec<(String, Kind, Node<'a, 'i>)>, Refused> {
+    let mut out = Vec::new();
+    for data in root.descendants().filter(|n| is(*n, "WavelengthData")) {
+        let band = match text(data, "Wavelength") {
+            "" => "Visible",
+            band => band,
+        };
+        let blocks = data.descendants();
+        for block in blocks.filter(|n| is(*n, "WavelengthDataBlock")) {
+            let direction = text(block, "WavelengthDataDirection");
+            let kind = Kind::parse(direction).ok_or_else(|| {
+                Refused::new(format!("unknown WavelengthDataDirection {direction:?}"))
+            })?;
+            out.push((band.to_owned(), kind, block));
+        }
     }
-}
-
-fn find<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
-    node.descendants().find(|n| n.has_tag_name_local(tag))
-}
-
-fn number(node: Node<'_, '_>, tag: &str) -> Result<f64, Refused> {
-    let text = find(node, tag).and_then(|n| n.text()).unwrap_or("").trim();
-    match text.parse::<f64>() {
-        Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(Refused::new(format!(
-            "the angle basis has {tag} = {text:?}, which is not a number"
-        ))),
-    }
+    Ok(out)
 }
 
 fn patches(root: Node<'_, '_>) -> Result<Vec<Patch>, Refused> {
     let basis =
         find(root, "AngleBasis").ok_or_else(|| Refused::new("the file has no AngleBasis"))?;
     let mut patches = Vec::new();
-    for ring in basis
-        .descendants()
-        .filter(|n| n.has_tag_name_local("AngleBasisBlock"))
-    {
+    for ring in basis.descendants().filter(|n| is(*n, "AngleBasisBlock")) {
         let (lo, hi, n) = (
             number(ring, "LowerTheta")?,
             number(ring, "UpperTheta")?,
@@ -304,8 +276,8 @@ fn patches(root: Node<'_, '_>) -> Result<Vec<Patch>, Refused> {
             phi: TAU * k as f64 / n as f64,
             phi_width: TAU / n as f64,
         }));
-        if patches.len() > 2500 {
-            return Err(Refused::new("the angle basis has more than 2,500 patches"));
+        if patches.len() > 1500 {
+            return Err(Refused::new("the angle basis has more than 1,500 patches"));
         }
     }
     let total: f64 = patches.iter().map(Patch::projected_solid_angle).sum();
@@ -320,7 +292,8 @@ fn patches(root: Node<'_, '_>) -> Result<Vec<Patch>, Refused> {
 }
 
 fn matrix(text: &str, n: usize, whose: &str) -> Result<Vec<f64>, Refused> {
-    let mut values = Vec::with_capacity(n * n);
+    // No more room than the text can fill: a damaged basis must not ask for gigabytes.
+    let mut values = Vec::with_capacity((n * n).min(text.len() / 2 + 1));
     for word in text
         .split(|c: char| c == ',' || c == ';' || c.is_whitespace())
         .filter(|w| !w.is_empty())

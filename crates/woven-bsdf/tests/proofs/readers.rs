@@ -227,3 +227,36 @@ fn fabric_errors_name_the_field() {
     let fabric = Fabric::from_toml(&text).unwrap();
     assert_eq!(Fabric::from_toml(&fabric.to_toml()).unwrap(), fabric);
 }
+
+#[test]
+fn a_back_of_its_own_colour() {
+    let text = |colors: &str| {
+        format!(
+            "name = \"x\"\n[optics]\nmodel = \"sheet\"\nparameters = {{ t_d = 0.3, r_d = 0.5 }}\n[optics.colors]\n{colors}\n"
+        )
+    };
+    let fabric =
+        Fabric::from_toml(&text("r_d = [1, 0.9, 0.8]\nr_d_back = [0.1, 0.2, 0.3]")).unwrap();
+    let (face, back) = (fabric.optics().unwrap(), fabric.optics_back().unwrap());
+    assert_eq!(
+        (face.linear[2], back.linear[2]),
+        ([0.5, 0.45, 0.4], [0.05, 0.1, 0.15])
+    );
+    // Transmission is one and the same, as reciprocity wants it.
+    assert_eq!((face.linear[0], face.shape), (back.linear[0], back.shape));
+    assert_eq!(Fabric::from_toml(&fabric.to_toml()).unwrap(), fabric);
+    // Without a second colour both sides are alike.
+    let plain = Fabric::from_toml(&text("r_d = [1, 0.9, 0.8]")).unwrap();
+    assert_eq!(
+        plain.optics_back().unwrap().linear,
+        plain.optics().unwrap().linear
+    );
+    for (colors, needle) in [
+        ("t_d_back = [1, 1, 1]", "t_d_back"),
+        ("r_d_back = [2, 1, 1]", "more than the light"),
+        ("r_d_back = [-1, 1, 1]", "colour of r_d"),
+    ] {
+        let e = Fabric::from_toml(&text(colors)).unwrap_err().to_string();
+        assert!(e.contains(needle), "{e:?} lacks {needle:?}");
+    }
+}

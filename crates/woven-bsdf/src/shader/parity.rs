@@ -1,0 +1,199 @@
+//! One model on the GPU against the same lines on the CPU: a kernel, its inputs, and what it must give.
+//!
+//! Nothing here needs a GPU: a crate that has one runs [`kernel`] over [`inputs`] and hands the result to [`compare`].
+
+use super::{functions, identifier};
+use crate::model::{Linear, MAX_LINEAR, MAX_SHAPE, ModelInfo, Role, Shape, normalized};
+use crate::vec3::Vec3;
+use std::f64::consts::TAU;
+
+/// Numbers of one input: shape, weights, l, v, u.
+pub const INPUTS: usize = MAX_SHAPE + MAX_LINEAR + 9;
+/// Numbers of one output: basis functions for (l, v), density of `l` for the viewer `v`, the sample for `v` and `u`.
+pub const OUTPUTS: usize = MAX_LINEAR + 4;
+/// Invocations of a workgroup.
+pub const GROUP: usize = 64;
+
+/// A compute shader with the entry point `main`: storage buffers of `f32`, group 0, binding 0 the inputs one after the
+/// other, binding 1 the outputs.
+pub fn kernel(model: &ModelInfo) -> String {
+    let name = identifier(model);
+    format!(
+        "{}\n@group(0) @binding(0) var<storage, read> inputs: array<f32>;\n\
+         @group(0) @binding(1) var<storage, read_write> outputs: array<f32>;\n\n\
+         fn vector(at: u32) -> vec3<f32> {{\n    return vec3<f32>(inputs[at], inputs[at + 1u], inputs[at + 2u]);\n}}\n\n\
+         @compute @workgroup_size({GROUP})\n\
+         fn main(@builtin(global_invocation_id) id: vec3<u32>) {{\n\
+         \x20   if id.x * {OUTPUTS}u >= arrayLength(&outputs) {{ return; }}\n\
+         \x20   let first = id.x * {INPUTS}u;\n\
+         \x20   var s: array<f32, {MAX_SHAPE}>;\n\
+         \x20   for (var i = 0u; i < {MAX_SHAPE}u; i++) {{ s[i] = inputs[first + i]; }}\n\
+         \x20   var w: array<f32, {MAX_LINEAR}>;\n\
+         \x20   for (var i = 0u; i < {MAX_LINEAR}u; i++) {{ w[i] = inputs[first + {MAX_SHAPE}u + i]; }}\n\
+         \x20   let at = first + {}u;\n\
+         \x20   let l = vector(at);\n    let v = vector(at + 3u);\n    let u = vector(at + 6u);\n\
+         \x20   let basis = {name}_basis(s, l, v);\n\
+         \x20   let sample = {name}_sample(s, w, v, u);\n\
+         \x20   let out = id.x * {OUTPUTS}u;\n\
+         \x20   for (var i = 0u; i < {MAX_LINEAR}u; i++) {{ outputs[out + i] = basis[i]; }}\n\
+         \x20   outputs[out + {MAX_LINEAR}u] = {name}_pdf(s, w, v, l);\n\
+         \x20   outputs[out + {}u] = sample.x;\n    outputs[out + {}u] = sample.y;\n    outputs[out + {}u] = sample.z;\n}}\n",
+        functions(model),
+        MAX_SHAPE + MAX_LINEAR,
+        MAX_LINEAR + 1,
+        MAX_LINEAR + 2,
+        MAX_LINEAR + 3,
+    )
+}
+
+/// A number in [0, 1) of the pair (seed, place): SplitMix64's mixer.
+fn unit(seed: u64, place: u64) -> f64 {
+    let z = seed
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        .wrapping_add(place.wrapping_mul(0xd134_2543_de82_ef95));
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Inputs number `first` to `first + n`: random legal parameters, of which widths are at least `width`, random light
+/// and viewer within 87° of the normal on either side (half of the pairs within some lobe widths of straight through).
+pub fn inputs(model: &ModelInfo, width: f64, first: u64, n: usize) -> Vec<f32> {
+    let mut out = Vec::with_capacity(n * INPUTS);
+    for i in first..first + n as u64 {
+        let mut place = 0;
+        let mut next = || {
+            place += 1;
+            unit(i + 1, place)
+        };
+        let values: Vec<f64> = model
+            .params
+            .iter()
+            .map(|p| match p.role {
+                Role::Linear => next() * p.max.min(1.0),
+                Role::Shape if p.log => {
+                    let lo = p.min.max(width.min(p.max));
+                    lo * (p.max / lo).powf(next())
+                }
+                Role::Shape => p.min + next() * (p.max - p.min),
+            })
+            .collect();
+        let (k, s) = model.split(&values);
+        let mut direction = |side: f64| {
+            let z = 0.05 + 0.95 * next();
+            let (r, phi) = ((1.0 - z * z).max(0.0).sqrt(), TAU * next());
+            Vec3::new(r * phi.cos(), r * phi.sin(), z * side)
+        };
+        let (l, far) = (direction(1.0), direction(-1.0));
+        let (spread, flip, near) = (next(), next(), next());
+        let mut v = if near < 0.5 {
+            (far * (0.3 * spread * spread) - l).normalize()
+        } else {
+            far
+        };
+        // A quarter on the same side, all of it turned over half of the time.
+        if flip < 0.25 {
+            v.z = -v.z;
+        }
+        let turn = if next() < 0.5 { 1.0 } else { -1.0 };
+        let u = [next(), next(), next()];
+        out.extend(s.map(|x| x as f32));
+        out.extend(normalized(&k).map(|x| x as f32));
+        let single = [l.x, l.y, l.z * turn, v.x, v.y, v.z * turn];
+        out.extend(single.into_iter().chain(u).map(|x| x as f32));
+    }
+    out
+}
+
+/// One input taken apart.
+fn parts(input: &[f32]) -> (Shape<f32>, Linear<f32>, [Vec3<f32>; 2], [f32; 3]) {
+    let at = |i: usize| input[i];
+    let base = MAX_SHAPE + MAX_LINEAR;
+    let vector = |i: usize| Vec3::new(at(base + i), at(base + i + 1), at(base + i + 2));
+    (
+        std::array::from_fn(at),
+        std::array::from_fn(|i| at(MAX_SHAPE + i)),
+        [vector(0), vector(3)],
+        std::array::from_fn(|i| at(base + 6 + i)),
+    )
+}
+
+/// What the model gives on the CPU in single precision.
+pub fn expected(model: &ModelInfo, inputs: &[f32]) -> Vec<f32> {
+    let mut out = Vec::with_capacity(inputs.len() / INPUTS * OUTPUTS);
+    for input in inputs.chunks_exact(INPUTS) {
+        let (s, w, [l, v], u) = parts(input);
+        out.extend((model.f32.basis)(&s, l, v));
+        out.push((model.f32.pdf)(&s, &w, v, l));
+        let wi = (model.f32.sample)(&s, &w, v, u);
+        out.extend([wi.x, wi.y, wi.z]);
+    }
+    out
+}
+
+/// How far a GPU is from the CPU.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Difference {
+    /// Greatest relative difference of a basis function above 1e-6 of its peak.
+    pub eval: f64,
+    /// Greatest relative difference of a density above 1e-6 of its peak.
+    pub pdf: f64,
+    /// Greatest difference of a component of a sample, coins that fell otherwise apart.
+    pub sample: f64,
+    /// Samples whose coin fell otherwise, by one rounding of a chance.
+    pub coins: usize,
+    /// Values above 1e-6 of their peak.
+    pub judged: usize,
+}
+
+/// Compares the outputs `gpu` of a kernel with [`expected`]. A peak is the greatest value of the model straight through,
+/// mirrored and at the pair itself, for the same light.
+pub fn compare(model: &ModelInfo, inputs: &[f32], cpu: &[f32], gpu: &[f32]) -> Difference {
+    let mut out = Difference::default();
+    let all = inputs
+        .chunks_exact(INPUTS)
+        .zip(cpu.chunks_exact(OUTPUTS))
+        .zip(gpu.chunks_exact(OUTPUTS));
+    for ((input, a), b) in all {
+        let (s, w, [l, v], _) = parts(input);
+        let peaks = [-v, Vec3::new(-v.x, -v.y, v.z)].map(|to| {
+            let mut p = [0.0; MAX_LINEAR + 1];
+            p[..MAX_LINEAR].copy_from_slice(&(model.f32.basis)(&s, to, v));
+            p[MAX_LINEAR] = (model.f32.pdf)(&s, &w, v, to);
+            p
+        });
+        debug_assert!(l.z != 0.0);
+        for j in 0..=MAX_LINEAR {
+            let peak = peaks[0][j].max(peaks[1][j]).max(a[j]);
+            if a[j] > 1e-6 * peak {
+                out.judged += 1;
+                let d = f64::from((a[j] - b[j]).abs() / a[j]);
+                let worst = if j < MAX_LINEAR {
+                    &mut out.eval
+                } else {
+                    &mut out.pdf
+                };
+                // A NaN is no small difference.
+                *worst = if d.is_nan() {
+                    f64::INFINITY
+                } else {
+                    worst.max(d)
+                };
+            } else if b[j].is_nan() {
+                out.eval = f64::INFINITY;
+            }
+        }
+        let d = (MAX_LINEAR + 1..OUTPUTS)
+            .map(|j| f64::from((a[j] - b[j]).abs()))
+            .fold(
+                0.0,
+                |m: f64, d| if d.is_nan() { f64::INFINITY } else { m.max(d) },
+            );
+        if d > 0.02 && d.is_finite() {
+            out.coins += 1;
+        } else {
+            out.sample = out.sample.max(d);
+        }
+    }
+    out
+}

@@ -5,4 +5,5 @@ pub mod beckmann;
 pub mod fresnel;
 pub mod ggx;
 pub mod hg;
+pub mod power;
 pub mod warp;

@@ -3,7 +3,7 @@
 use super::lambert::{self, K_D};
 use super::{Linear, Model, Param, Shape, fold};
 use crate::real::Real;
-use crate::term::fresnel;
+use crate::term::{fresnel, power};
 use crate::vec3::Vec3;
 use std::f64::consts::PI;
 
@@ -12,11 +12,13 @@ pub struct AshikhminShirley;
 
 /// √((n_u+1)(n_v+1)) (n·h)^(n_u cos²φ_h + n_v sin²φ_h), the numerator that f and the density share.
 #[inline(always)]
-fn power<R: Real>(h: Vec3<R>, n_u: R, n_v: R) -> R {
+fn numerator<R: Real>(h: Vec3<R>, n_u: R, n_v: R) -> R {
     let sin2 = (h.x.sqr() + h.y.sqr()).max(R::of(1e-14));
+    // 1 - n·h without the rounding of a cosine near 1.
+    let lack = sin2 / (h.z + R::one());
     let exponent = (n_u * h.x.sqr() + n_v * h.y.sqr()) / sin2;
     let norm = ((n_u + R::one()) * (n_v + R::one())).sqrt();
-    norm * h.z.max(R::of(1e-5)).powf(exponent)
+    norm * power::of_one_minus(lack.min(R::of(1.0 - 1e-5)), exponent)
 }
 
 impl Model for AshikhminShirley {
@@ -48,7 +50,7 @@ impl Model for AshikhminShirley {
         let h = (lu + vu).normalize();
         let cos_d = lu.dot(h);
         let den = (cos_d * lu.z.max(vu.z) * R::of(8.0 * PI)).max(R::of(1e-7));
-        let lobe = power(h, s[0], s[1]) * fresnel::schlick(cos_d, s[2]) / den;
+        let lobe = numerator(h, s[0], s[1]) * fresnel::schlick(cos_d, s[2]) / den;
         let mut b = [R::zero(); 8];
         b[0] = lambert::floor(l, v);
         b[1] = fold::transmitted(l, v, lobe);
@@ -59,7 +61,7 @@ impl Model for AshikhminShirley {
     fn pdf<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>, wi: Vec3<R>) -> R {
         let (v, l) = (fold::up(wo), fold::up(wi));
         let h = (l + v).normalize();
-        let lobe = power(h, s[0], s[1]) / (v.dot(h) * R::of(8.0 * PI)).max(R::of(1e-7));
+        let lobe = numerator(h, s[0], s[1]) / (v.dot(h) * R::of(8.0 * PI)).max(R::of(1e-7));
         w[0] * lambert::pdf(wo, wi) + w[1] * fold::transmitted(wo, wi, lobe)
     }
     /// The paper's (9), (10) in slopes: with both numbers turned to a point of the circle, no quadrants are needed.
@@ -71,12 +73,10 @@ impl Model for AshikhminShirley {
         let y = turn.sin() / (s[1] + R::one()).sqrt();
         let len2 = (x.sqr() + y.sqr()).max(R::of(1e-20));
         let exponent = (s[0] * x.sqr() + s[1] * y.sqr()) / len2;
-        let cos = u[0]
-            .one_minus()
-            .max(R::of(1e-12))
-            .powf((exponent + R::one()).recip());
-        let r = cos.sqr().one_minus().sqrt_pos() / len2.sqrt();
-        let h = Vec3::new(x * r, y * r, cos);
+        // cosθ_h = (1 - u)^(1/(exponent+1)).
+        let lack = power::one_minus_exp(-(power::ln_one_minus(u[0]) / (exponent + R::one())));
+        let r = power::sine(lack) / len2.sqrt();
+        let h = Vec3::new(x * r, y * r, lack.one_minus());
         let v = fold::up(wo);
         let d = v.dot(h);
         let l = h * (d * R::of(2.0)) - v;

@@ -3,19 +3,19 @@
 use super::lambert::{self, K_D};
 use super::{Linear, Model, Param, Shape, fold};
 use crate::real::Real;
-use crate::term::warp;
+use crate::term::{power, warp};
 use crate::vec3::Vec3;
 use std::f64::consts::PI;
 
 /// See [`Model::DOC`].
 pub struct Phong;
 
-/// max(0, v·t)^m with a floor that keeps the logarithm finite: (1e-4)^m is nothing.
+/// max(0, v·t)^m, from what the cosine lacks of 1: half the squared distance of v and t. Beyond 89.99° it is nothing.
 #[inline(always)]
-fn power<R: Real>(l: Vec3<R>, v: Vec3<R>, m: R) -> R {
-    let cos = -l.dot(v);
-    let value = cos.max(R::of(1e-4)).powf(m);
-    R::select(cos.gt(R::of(1e-4)), value, R::zero())
+fn lobe<R: Real>(l: Vec3<R>, v: Vec3<R>, m: R) -> R {
+    let lack = (l + v).length_sqr() * R::of(0.5);
+    let value = power::of_one_minus(lack.min(R::one()), m);
+    R::select(lack.lt(R::of(1.0 - 1e-4)), value, R::zero())
 }
 
 impl Model for Phong {
@@ -45,7 +45,7 @@ impl Model for Phong {
 
     #[inline(always)]
     fn basis<R: Real>(s: &Shape<R>, l: Vec3<R>, v: Vec3<R>) -> Linear<R> {
-        let lobe = power(l, v, s[0]) * (s[0] + R::of(2.0)) * R::of(0.5 / PI);
+        let lobe = lobe(l, v, s[0]) * (s[0] + R::of(2.0)) * R::of(0.5 / PI);
         let mut b = [R::zero(); 8];
         b[0] = lambert::floor(l, v);
         b[1] = fold::transmitted(l, v, lobe);
@@ -53,13 +53,14 @@ impl Model for Phong {
     }
     #[inline(always)]
     fn pdf<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>, wi: Vec3<R>) -> R {
-        let lobe = power(wi, wo, s[0]) * (s[0] + R::one()) * R::of(0.5 / PI);
+        let lobe = lobe(wi, wo, s[0]) * (s[0] + R::one()) * R::of(0.5 / PI);
         w[0] * lambert::pdf(wo, wi) + w[1] * fold::transmitted(wo, wi, lobe)
     }
     #[inline(always)]
     fn sample<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>, u: [R; 3]) -> Vec3<R> {
-        let cos = u[0].max(R::of(1e-12)).powf((s[0] + R::one()).recip());
-        let wi = warp::around(-wo, cos.clamp(0.0, 1.0), u[1]);
+        // cosθ = (1 - u)^(1/(m+1)).
+        let lack = power::one_minus_exp(-(power::ln_one_minus(u[0]) / (s[0] + R::one())));
+        let wi = warp::around_by(-wo, power::sine(lack), lack.one_minus(), u[1]);
         let lobe = Vec3::select(fold::transmits(wo, wi), wi, Vec3::zero());
         Vec3::select(u[2].lt(w[0]), lambert::sample(wo, u[0], u[1]), lobe)
     }

@@ -1,6 +1,7 @@
 //! The Beckmann distribution of facet slopes.
 
 use crate::real::Real;
+use crate::term::power;
 use crate::vec3::Vec3;
 use std::f64::consts::PI;
 
@@ -15,9 +16,9 @@ pub fn d<R: Real>(cos_h: R, m: R) -> R {
 /// A facet normal drawn with density D·cosθ (Walter 2007, (28)).
 #[inline(always)]
 pub fn sample<R: Real>(m: R, u1: R, u2: R) -> Vec3<R> {
-    let tan2 = -(m.sqr() * u1.one_minus().max(R::of(1e-12)).ln());
+    let tan2 = -(m.sqr() * power::ln_one_minus(u1));
     let cos = (R::one() + tan2).sqrt().recip();
-    let sin = cos.sqr().one_minus().sqrt_pos();
+    let sin = tan2.sqrt_pos() * cos;
     let phi = u2 * R::of(2.0 * PI);
     Vec3::new(sin * phi.cos(), sin * phi.sin(), cos)
 }

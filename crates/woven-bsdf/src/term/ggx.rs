@@ -1,6 +1,7 @@
 //! The GGX distribution, its masking, and a sampler of its visible normals.
 
 use crate::real::Real;
+use crate::term::power;
 use crate::vec3::Vec3;
 use std::f64::consts::PI;
 
@@ -41,8 +42,10 @@ pub fn pdf<R: Real>(l: Vec3<R>, v: Vec3<R>, ax: R, ay: R) -> R {
 pub fn visible_normal<R: Real>(v: Vec3<R>, ax: R, ay: R, u1: R, u2: R) -> Vec3<R> {
     let std = Vec3::new(v.x * ax, v.y * ay, v.z).normalize();
     let phi = u1 * R::of(2.0 * PI);
-    let z = u2.one_minus() * (R::one() + std.z) - std.z;
-    let sin = z.sqr().one_minus().sqrt_pos();
+    // z = (1 - u2)(1 + std.z) - std.z, and its sine from what it lacks of 1, which keeps its digits.
+    let lack = u2 * (R::one() + std.z);
+    let z = lack.one_minus();
+    let sin = power::sine(lack);
     let cap = Vec3::new(sin * phi.cos(), sin * phi.sin(), z) + std;
     Vec3::new(cap.x * ax, cap.y * ay, cap.z.max(R::of(1e-6))).normalize()
 }

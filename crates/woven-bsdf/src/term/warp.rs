@@ -15,7 +15,12 @@ pub fn cosine<R: Real>(u1: R, u2: R) -> Vec3<R> {
 /// The direction at the angle with cosine `cos` from the unit vector `axis`, turned by `u` of a full turn about it.
 #[inline(always)]
 pub fn around<R: Real>(axis: Vec3<R>, cos: R, u: R) -> Vec3<R> {
-    let sin = cos.sqr().one_minus().sqrt_pos();
+    around_by(axis, cos.sqr().one_minus().sqrt_pos(), cos, u)
+}
+
+/// [`around`] for an angle of which sine and cosine are known.
+#[inline(always)]
+pub fn around_by<R: Real>(axis: Vec3<R>, sin: R, cos: R, u: R) -> Vec3<R> {
     let phi = u * R::of(2.0 * PI);
     let (x, y) = (sin * phi.cos(), sin * phi.sin());
     // Frame about the axis after Duff et al. 2017, "Building an Orthonormal Basis, Revisited".

@@ -274,3 +274,29 @@ fn the_slab_is_as_wide_as_two_interfaces() {
         );
     }
 }
+
+#[test]
+fn powers_near_one_keep_their_digits() {
+    use woven_bsdf::term::power;
+    for i in 0..400 {
+        let x = 10f64.powf(-12.0 + 12.0 * f64::from(i) / 400.0);
+        // The standard library's ln_1p and exp_m1 are independent of the series.
+        assert!(
+            (power::ln_one_minus(x) / (-x).ln_1p() - 1.0).abs() < 2e-15,
+            "{x}"
+        );
+        assert!(
+            (power::one_minus_exp(x) / -(-x).exp_m1() - 1.0).abs() < 2e-12,
+            "{x}"
+        );
+        // In single precision the power of a narrow lobe is that of double precision, to the rounding of ln(1-x) times e: 14 where the value ends.
+        let single = power::of_one_minus(x as f32, 1e4);
+        let double = power::of_one_minus(f64::from(x as f32), 1e4);
+        if double > 1e-6 {
+            assert!(
+                (f64::from(single) / double - 1.0).abs() < 3e-6,
+                "{x}: {single} {double}"
+            );
+        }
+    }
+}

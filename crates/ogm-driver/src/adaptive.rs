@@ -2,12 +2,130 @@
 //!
 //! What is chosen follows from the readings in the log alone, so a resumed scan goes the same way.
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Result;
 use crate::log::{Reading, What};
 use crate::merge::{Value, merge_readings};
-use crate::plan::{Adaptive, Grid, Plan};
+use crate::plan::{Angles, Grid, Plan, product, refused, zero};
 use crate::pose::Pose;
 use crate::rig::Rig;
+
+/// The adaptive grid: first `first_step` over each plane and some poses beside straight through, then halved intervals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Adaptive {
+    /// Light polar angles, degrees.
+    pub theta_l: Angles,
+    /// Light azimuths, degrees.
+    pub phi_l: Angles,
+    /// Azimuths of the detector's planes, degrees; each plane is run on both sides of the normal.
+    pub planes: Angles,
+    /// The planes end this far from straight behind the sample, degrees.
+    pub reach: f64,
+    /// First distance of the poses, degrees.
+    pub first_step: f64,
+    /// No interval is made shorter than this, degrees.
+    pub least_step: f64,
+    /// A straight line between neighbours may be off by this share of the value (and a fiftieth of the peak).
+    pub tolerance: f64,
+    /// At least this many poses within the full width at half maximum.
+    pub per_fwhm: u32,
+    /// Never more poses than this.
+    pub most: u32,
+}
+
+impl Default for Adaptive {
+    fn default() -> Self {
+        Adaptive {
+            theta_l: zero(),
+            phi_l: zero(),
+            planes: zero(),
+            reach: 80.0,
+            first_step: 16.0,
+            least_step: 0.1,
+            tolerance: 0.05,
+            per_fwhm: 5,
+            most: 10_000,
+        }
+    }
+}
+
+impl Adaptive {
+    /// Every (theta_l, phi_l, plane).
+    ///
+    /// # Errors
+    /// [`Error::Plan`].
+    pub fn planes(&self) -> Result<Vec<(f64, f64, f64)>> {
+        let (tl, pl) = (
+            self.theta_l.values("grid.theta_l")?,
+            self.phi_l.values("grid.phi_l")?,
+        );
+        let planes = self.planes.values("grid.planes")?;
+        product([tl.len(), pl.len(), planes.len()])?;
+        let mut out = Vec::new();
+        for t in &tl {
+            for p in &pl {
+                out.extend(planes.iter().map(|plane| (*t, *p, *plane)));
+            }
+        }
+        Ok(out)
+    }
+
+    /// The pose at the signed angle `t` (degrees from straight behind the sample) of a plane.
+    pub fn pose(theta_l: f64, phi_l: f64, plane: f64, t: f64) -> Pose {
+        let phi = if t >= 0.0 {
+            plane
+        } else if plane > 0.0 {
+            plane - 180.0
+        } else {
+            plane + 180.0
+        };
+        Pose::new(theta_l, phi_l, 180.0 - t.abs(), phi)
+    }
+
+    /// The first poses: even over each plane, and closer and closer towards straight through.
+    ///
+    /// # Errors
+    /// [`Error::Plan`](crate::error::Error::Plan) for numbers that make no grid.
+    pub(crate) fn first(&self) -> Result<Vec<Pose>> {
+        let positive = [self.reach, self.first_step, self.least_step, self.tolerance];
+        if positive.iter().any(|x| x.is_nan() || *x <= 0.0)
+            || self.reach > 89.0
+            || self.per_fwhm > 1000
+            || self.least_step < 0.01
+        {
+            return Err(refused(
+                "an adaptive grid needs reach in 0..89, positive first_step and tolerance, least_step of at least 0.01, per_fwhm up to 1000",
+            ));
+        }
+        let n = (self.reach / self.first_step).ceil().clamp(1.0, 1000.0);
+        let planes = self.planes()?;
+        product([planes.len(), 2 * n as usize + 9])?;
+        let mut out = Vec::new();
+        for (theta_l, phi_l, plane) in planes {
+            let mut angles: Vec<f64> = (0..=2 * n as u32)
+                .map(|k| self.reach * (f64::from(k) / n - 1.0))
+                .collect();
+            // Straight through lies on this plane at +theta_l or -theta_l, if at all.
+            let turn = (phi_l + 180.0 - plane).rem_euclid(360.0);
+            let opposite = (90.0..=270.0).contains(&turn);
+            let straight = if opposite { -theta_l } else { theta_l };
+            for offset in [1.0, 2.0, 4.0, 8.0] {
+                angles.extend([straight - offset, straight + offset]);
+            }
+            angles.retain(|t| t.abs() <= self.reach);
+            angles.sort_by(f64::total_cmp);
+            angles.dedup_by(|a, b| (*a - *b).abs() < 0.5);
+            out.extend(
+                angles
+                    .into_iter()
+                    .map(|t| Self::pose(theta_l, phi_l, plane, t)),
+            );
+        }
+        Ok(out)
+    }
+}
 
 /// The poses that an adaptive plan wants next, given the readings so far; none when it is content, or not adaptive.
 ///
@@ -36,15 +154,23 @@ pub fn refine(plan: &Plan, rig: &Rig, readings: &[Reading], poses: &[Pose]) -> R
         line.dedup_by(|p, q| (p.0 - q.0).abs() < 1e-3);
         let d = &rig.detector;
         let blind = d.aperture_deg / 2.0 + d.beam_half_deg + 4.3 * d.angle_deg;
-        for t in halve(&line, a, straight_at(theta_l, phi_l, plane), blind) {
+        for (t, need) in halve(&line, a, straight_at(theta_l, phi_l, plane), blind) {
             let pose = Adaptive::pose(theta_l, phi_l, plane, t);
-            let new = !poses.iter().chain(&out).any(|p| same(p, &pose));
-            if new && rig.pulses(pose).is_ok() && poses.len() + out.len() < a.most as usize {
-                out.push(pose);
+            let mut known = poses.iter().chain(out.iter().map(|(_, p)| p));
+            if !known.any(|p| same(p, &pose)) && rig.pulses(pose).is_ok() {
+                out.push((need, pose));
             }
         }
     }
-    Ok(out)
+    // Where not all may be taken, those that are needed most; then again in the order of the planes.
+    let room = a.most as usize - poses.len();
+    if out.len() > room {
+        let mut needs: Vec<f64> = out.iter().map(|(need, _)| *need).collect();
+        needs.sort_by(|p, q| q.total_cmp(p));
+        let least = needs[room];
+        out.retain(|(need, _)| *need > least);
+    }
+    Ok(out.into_iter().map(|(_, pose)| pose).collect())
 }
 
 fn same(a: &Pose, b: &Pose) -> bool {
@@ -82,8 +208,9 @@ fn straight_at(theta_l: f64, phi_l: f64, plane: f64) -> Option<f64> {
     }
 }
 
-/// Middles of the intervals where a straight line is not good enough: its middle is compared with that of a cubic through the four nearest points.
-fn halve(line: &[(f64, f64)], a: &Adaptive, straight: Option<f64>, blind: f64) -> Vec<f64> {
+/// Middles of the intervals where a straight line is not good enough, each with how much it is needed (over 1): the line's middle is compared with
+/// that of a cubic through the four nearest points.
+fn halve(line: &[(f64, f64)], a: &Adaptive, straight: Option<f64>, blind: f64) -> Vec<(f64, f64)> {
     let mut out = Vec::new();
     if line.len() < 4 {
         return out;
@@ -105,16 +232,25 @@ fn halve(line: &[(f64, f64)], a: &Adaptive, straight: Option<f64>, blind: f64) -
         if let Some(s) = straight.filter(|s| (middle - s).abs() < blind) {
             // The straight beam hides the middle: as near to it as can be seen, on both sides.
             let beside = [s - 1.3 * blind, s + 1.3 * blind].map(|t| (t * 1000.0).round() / 1000.0);
-            out.extend(beside.iter().filter(|t| **t > t0 + 0.01 && **t < t1 - 0.01));
+            let inside = beside
+                .into_iter()
+                .filter(|t| *t > t0 + 0.01 && *t < t1 - 0.01);
+            out.extend(inside.map(|t| (t, f64::MAX)));
             continue;
         }
         let first = i.saturating_sub(1).min(line.len() - 4);
         let cubic = lagrange(&line[first..first + 4], middle);
         let linear = 0.5 * (f0 + f1);
-        let coarse = f0.max(f1) > 0.5 * (peak + floor) && h > fwhm / f64::from(a.per_fwhm);
-        if coarse || (cubic - linear).abs() > a.tolerance * (linear + 0.02 * peak) {
+        let bent = (cubic - linear).abs() / (a.tolerance * (linear + 0.02 * peak));
+        let coarse = if f0.max(f1) > 0.5 * (peak + floor) {
+            h * f64::from(a.per_fwhm) / fwhm
+        } else {
+            0.0
+        };
+        let need = bent.max(coarse);
+        if need > 1.0 {
             // On the pulse grid of any stage: thousandths of a degree.
-            out.push((middle * 1000.0).round() / 1000.0);
+            out.push(((middle * 1000.0).round() / 1000.0, need));
         }
     }
     out
@@ -178,7 +314,7 @@ mod tests {
             .collect();
         for _ in 0..12 {
             let more = halve(&line, &a, None, 0.0);
-            line.extend(more.into_iter().map(|t| (t, f(t))));
+            line.extend(more.into_iter().map(|(t, _)| (t, f(t))));
             line.sort_by(|p, q| p.0.total_cmp(&q.0));
         }
         let inside = line.iter().filter(|p| p.0.abs() < 1.177).count();

@@ -152,6 +152,44 @@ fn the_straight_beam_is_a_transmittance_and_the_white_standard_agrees() {
     );
 }
 
+#[test]
+fn five_decades_of_light_within_one_percent_through_the_whole_rig() {
+    // From 1e-4 to 12 per steradian over 60° at normal incidence; the rig bends by 0.5 %, drifts, and has its dark level.
+    let f = |_: [f64; 3], v: [f64; 3]| {
+        let t = v[2].abs().min(1.0).acos().to_degrees();
+        12.0 * 10_f64.powf(-5.1 * t / 60.0)
+    };
+    let sample = Arc::new(FnSample {
+        bsdf: f,
+        direct: |_: [f64; 3]| 0.0,
+    });
+    let mut rig = Rig::default();
+    rig.detector.aperture_deg = 0.5; // the slope of a decade in 12° bends the mean over 1° by 0.2 %
+    let plan = Plan::from_toml("straight_through = false\nname = 'h'\n[grid]\nkind = 'uniform'\ntheta_l = [0]\nphi_l = [0]\ntheta_v = { from = 120, to = 179, step = 1 }\nphi_v = [0]\n[exposure]\nladder_ms = [0.01, 0.04, 0.16, 0.64, 2.56, 10.24, 40.96, 163.84, 655.36, 2621.44, 10485.76]\nrepeats = 4\n[calibration]\ndark = 8").unwrap();
+    let wrong = Imperfections {
+        misalignment_deg: [0.0; 4],
+        counts_per_ms: 6e7,
+        ..wrong(1)
+    };
+    let m = measure(&rig, sample, wrong, &plan);
+    let (mut worst, mut least, mut most) = (0.0_f64, f64::INFINITY, 0.0_f64);
+    for s in &m.samples {
+        let truth = f(s.pose.light(), s.pose.view());
+        worst = worst.max((s.f / truth - 1.0).abs());
+        (least, most) = (least.min(truth), most.max(truth));
+    }
+    println!(
+        "{} values over {:.1} decades: worst error {:.2} %",
+        m.samples.len(),
+        (most / least).log10(),
+        worst * 100.0
+    );
+    assert!(
+        most / least > 0.99e5 && worst < 0.01,
+        "{most} {least} {worst}"
+    );
+}
+
 /// A forward lobe of full width `fwhm` degrees at half maximum, on a low floor.
 fn lobe(fwhm: f64) -> impl Fn([f64; 3], [f64; 3]) -> f64 + Send + Sync + Copy {
     move |l, v| {

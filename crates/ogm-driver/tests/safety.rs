@@ -40,6 +40,7 @@ fn random_rig(noise: &mut Noise) -> Rig {
 }
 
 fn random_plan(noise: &mut Noise, rig: &Rig) -> Plan {
+    let noise_of_grid = noise.below(300);
     let angle = |noise: &mut Noise, axis: &Axis| {
         let (a, b) = (axis.min_deg, axis.max_deg);
         match noise.below(8) {
@@ -50,25 +51,50 @@ fn random_plan(noise: &mut Noise, rig: &Rig) -> Plan {
             _ => a + (b - a) * noise.uniform(),
         }
     };
-    let count = 1 + noise.below(4);
-    let poses: Vec<String> = (0..count)
-        .map(|_| {
-            let a: Vec<String> = rig
-                .axes
-                .iter()
-                .map(|axis| format!("{}", angle(noise, axis)))
+    let mut one = |axis: usize| angle(noise, &rig.axes[axis]);
+    // Mostly a few poses anywhere; now and then the grids that users name.
+    let grid = match noise_of_grid {
+        0 => format!(
+            "kind = 'paper'\nlight_elevations = [{}]",
+            180.0 - one(0).abs()
+        ),
+        1 => format!(
+            "kind = 'klems'\ntheta_l = [{}]\nphi_l = [{}]",
+            one(0),
+            one(1)
+        ),
+        2 => format!(
+            "kind = 'adaptive'\ntheta_l = [{}]\nplanes = [{}]\nfirst_step = 40\nmost = 30",
+            one(0),
+            one(3)
+        ),
+        3..12 => format!(
+            "kind = 'uniform'\ntheta_l = [{}, {}]\nphi_l = [{}]\ntheta_v = [{}, {}]\nphi_v = [{}]",
+            one(0),
+            one(0),
+            one(1),
+            one(2),
+            one(2),
+            one(3)
+        ),
+        12..22 => format!(
+            "kind = 'random'\ncount = 3\nseed = {noise_of_grid}\ntheta_max = {}",
+            1.0 + one(0).abs().min(80.0)
+        ),
+        _ => {
+            let poses: Vec<String> = (0..=noise_of_grid % 4)
+                .map(|_| format!("[{},{},{},{}]", one(0), one(1), one(2), one(3)))
                 .collect();
-            format!("[{}]", a.join(","))
-        })
-        .collect();
+            format!("kind = 'list'\nposes = [{}]", poses.join(","))
+        }
+    };
     let leave = if noise.below(4) > 0 {
         "leave-out"
     } else {
         "refuse"
     };
     Plan::from_toml(&format!(
-        "name = 'r'\nforbidden = '{leave}'\n[grid]\nkind = 'list'\nposes = [{}]\n[exposure]\nladder_ms = [1]\n[calibration]\ndark = 0\ndirect = 1\nwhite = {}",
-        poses.join(","),
+        "name = 'r'\nforbidden = '{leave}'\n[grid]\n{grid}\n[exposure]\nladder_ms = [1]\n[calibration]\ndark = 0\ndirect = 1\nwhite = {}",
         noise.below(2) == 0
     ))
     .unwrap()

@@ -96,6 +96,24 @@ fn main() -> Result<()> {
             noise * cpu
         );
         if let Some(path) = &out {
+            let noise: Vec<[f32; 3]> = a
+                .iter()
+                .zip(b)
+                .map(|(p, q)| {
+                    let e: f32 = (0..3)
+                        .map(|c| {
+                            let m = 0.5 * (p[c] + q[c]);
+                            (p[c] - q[c]).powi(2) / 2.0 / (m * m + 0.01) / 3.0
+                        })
+                        .sum();
+                    [(e * spp as f32 * 2.0).min(4.0); 3]
+                })
+                .collect();
+            woven_render::film::Film::of_beauty(first.width, first.height, noise).write_png(
+                &Path::new(path).with_extension(format!("{name}.png")),
+                Curve::Clip,
+                1.0,
+            )?;
             first.write_png(Path::new(path), Curve::default(), scene.camera.exposure)?;
         }
     }

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use crate::accumulate::{Accumulation, PixelSum};
 use crate::cpu::path::View;
+use crate::cpu::share::{BLOCK, shift};
 use crate::table::Table;
 use buffers::Buffers;
 pub use buffers::Frame;
@@ -100,35 +101,56 @@ impl Gpu {
         self.longest
     }
 
-    /// Adds `count` samples to every pixel, in submits of about [`AIM`].
+    /// Adds `count` samples to every pixel, in submits that are waited for after about [`AIM`].
     pub(crate) fn step(&mut self, view: &View, count: u32, stop: &AtomicBool) -> Result<bool> {
-        let blocks = self.width.div_ceil(8) * self.height.div_ceil(8);
-        // A pass gives every pixel the same number of samples; it is cut into ranges of blocks.
-        let mut done = 0;
-        while done < count {
+        let goal = self.samples + count;
+        while self.samples < goal {
             // Only between passes: the samples of a broken one could not be taken back on the device.
             if stop.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let together = (self.load / blocks).clamp(1, count - done);
+            // A pass gives every pixel one sample. Small ones are sent together, large ones cut into ranges of blocks.
+            let blocks = self.blocks(self.samples);
+            let most = self.context.device.max_groups;
+            if self.load >= 2 * blocks && blocks < most {
+                let together = (self.load / blocks).min(goal - self.samples);
+                let began = Instant::now();
+                let mut sent = None;
+                for index in self.samples..self.samples + together {
+                    let frame = Frame::new(view, &self.globals, index, 0);
+                    sent = Some(self.submit(&frame, self.blocks(index)));
+                }
+                self.wait(sent)?;
+                self.adapt(began.elapsed(), together * blocks);
+                self.samples += together;
+                continue;
+            }
             let mut block = 0;
             while block < blocks {
-                let range = (self.load / together)
-                    .clamp(1, blocks - block)
-                    .min(self.context.device.max_groups);
-                let frame = Frame::new(view, &self.globals, self.samples, together, block, range);
+                let range = self.load.clamp(1, blocks - block).min(most);
                 let began = Instant::now();
-                self.submit(&frame, range)?;
-                self.adapt(began.elapsed(), together * range);
+                let frame = Frame::new(view, &self.globals, self.samples, block);
+                let sent = self.submit(&frame, range);
+                self.wait(Some(sent))?;
+                self.adapt(began.elapsed(), range);
                 block += range;
             }
-            done += together;
-            self.samples += together;
+            self.samples += 1;
         }
         Ok(true)
     }
 
-    fn submit(&self, frame: &Frame, groups: u32) -> Result<()> {
+    /// Blocks of pixels that cover the picture for a sample.
+    fn blocks(&self, index: u32) -> u32 {
+        let (left, above) = shift(index);
+        (self.width + left).div_ceil(BLOCK) * (self.height + above).div_ceil(BLOCK)
+    }
+
+    fn wait(&self, sent: Option<wgpu::SubmissionIndex>) -> Result<()> {
+        sent.map_or(Ok(()), |index| self.context.device.wait(index, PATIENCE))
+    }
+
+    fn submit(&self, frame: &Frame, groups: u32) -> wgpu::SubmissionIndex {
         let (device, queue) = (&self.context.device.device, &self.context.device.queue);
         queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(frame));
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
@@ -143,8 +165,7 @@ impl Gpu {
             pass.set_bind_group(0, &self.buffers.group, &[]);
             pass.dispatch_workgroups(groups, 1, 1);
         }
-        let index = queue.submit([encoder.finish()]);
-        self.context.device.wait(index, PATIENCE)
+        queue.submit([encoder.finish()])
     }
 
     /// Sizes the next submit by the time of the last.

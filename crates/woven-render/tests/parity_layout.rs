@@ -88,7 +88,7 @@ fn rows_lie_where_the_shader_reads_them() {
     );
     same!(
         m, Frame, eye, aperture, right, focus, up, width, forward, height, lens_x, depth, lens_y,
-        seed, first, count, block, blocks, globals
+        seed, index, left, above, block, globals
     );
     same!(m, PixelSum, light, albedo, normal);
     // Texture rows are read by words: the shader's constant is Rust's size.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Controller, QUESTION_TRIES, verify};
+use super::{Controller, four, named, question, verify};
 use crate::error::{Error, Result};
 use crate::pose::AXES;
 use crate::protocol::grbl::{self, Line, RealTime, Reply, Report, State};
@@ -25,15 +25,11 @@ impl GrblController {
     fn order(&mut self, link: &mut Link, line: &Line, deadline: Duration) -> Result<()> {
         let bytes = grbl::encode(line)
             .ok_or_else(|| Error::Rig(format!("The line {line:?} is too long for GRBL.")))?;
-        let name = String::from_utf8_lossy(&bytes).trim_end().to_string();
+        let name = named(&bytes);
         let offset = &mut self.work_offset;
         link.ask(&bytes, deadline, 1, |text| {
             match grbl::parse_reply(text, offset) {
                 Some(Reply::Ok) => Ok(Some(())),
-                Some(Reply::Error(15)) => Err(Error::Refused {
-                    command: name.clone(),
-                    why: format!("error 15, {}", grbl::error_meaning(15)),
-                }),
                 Some(Reply::Error(n)) => Err(Error::Refused {
                     command: name.clone(),
                     why: format!("error {n}, {}", grbl::error_meaning(n)),
@@ -46,10 +42,10 @@ impl GrblController {
 
     fn report(&mut self, link: &mut Link, rig: &Rig, command: &str) -> Result<Report> {
         let offset = &mut self.work_offset;
-        link.ask(
+        question(
+            link,
+            rig,
             &[RealTime::Status.byte()],
-            rig.reply(),
-            QUESTION_TRIES,
             |text| match grbl::parse_reply(text, offset) {
                 Some(Reply::Report(r)) if r.machine.len() >= AXES => Ok(Some(r)),
                 Some(other) => unexpected(&other, command).map_or(Ok(None), Err),
@@ -81,17 +77,9 @@ fn unexpected(reply: &Reply, command: &str) -> Option<Error> {
     }
 }
 
-fn four(machine: &[i64]) -> [i64; AXES] {
-    let mut out = [0; AXES];
-    out.copy_from_slice(&machine[..AXES]);
-    out
-}
-
 impl Controller for GrblController {
     fn identify(&mut self, link: &mut Link, rig: &Rig) -> Result<String> {
-        // Opening the port resets most boards: let the welcome pass before the first question.
-        link.wait(Duration::from_millis(20))?;
-        link.ask(b"$I\n", rig.reply(), QUESTION_TRIES, |text| {
+        question(link, rig, b"$I\n", |text| {
             Ok(text
                 .starts_with("[VER:")
                 .then(|| text.trim_matches(['[', ']']).to_string()))
@@ -131,9 +119,7 @@ impl Controller for GrblController {
             .fold(f64::INFINITY, f64::min)
             .clamp(1.0, 1e6) as u32;
         let line = Line::Jog(target.to_vec(), feed);
-        let name = String::from_utf8_lossy(&grbl::encode(&line).unwrap_or_default())
-            .trim_end()
-            .to_string();
+        let name = named(&grbl::encode(&line).unwrap_or_default());
         self.order(link, &line, rig.reply())?;
         let start = link.now();
         // The feed holds for the whole vector of four axes, so the path may be up to twice as long as its longest axis.

@@ -59,6 +59,28 @@ pub fn controller_for(rig: &Rig) -> Box<dyn Controller> {
     }
 }
 
+/// Asks what changes nothing, so it may be repeated; the answer is the first line that `read` takes.
+fn question<T>(
+    link: &mut Link,
+    rig: &Rig,
+    bytes: &[u8],
+    read: impl FnMut(&str) -> Result<Option<T>>,
+) -> Result<T> {
+    link.ask(bytes, rig.reply(), QUESTION_TRIES, read)
+}
+
+/// The name of a command for messages: its bytes without the line end.
+fn named(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).trim_end().to_string()
+}
+
+/// The positions of the rig's axes out of a status that has at least as many.
+fn four(positions: &[i64]) -> [i64; AXES] {
+    let mut out = [0; AXES];
+    out.copy_from_slice(&positions[..AXES]);
+    out
+}
+
 /// Compares reached and wanted pulses and names the first axis that is off.
 pub(crate) fn verify(
     rig: &Rig,

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Controller, QUESTION_TRIES, verify};
+use super::{Controller, four, named, question, verify};
 use crate::axis::Axis;
 use crate::error::{Error, Result};
 use crate::pose::AXES;
@@ -31,21 +31,15 @@ impl ShotController {
     }
 
     fn status(&self, link: &mut Link, rig: &Rig) -> Result<Status> {
-        link.ask(
-            &self.bytes(&Command::Status)?,
-            rig.reply(),
-            QUESTION_TRIES,
-            |line| Ok(shot::parse_status(line).filter(|s| s.positions.len() == AXES)),
-        )
+        question(link, rig, &self.bytes(&Command::Status)?, |line| {
+            Ok(shot::parse_status(line).filter(|s| s.positions.len() == AXES))
+        })
     }
 
     fn busy(&self, link: &mut Link, rig: &Rig) -> Result<bool> {
-        link.ask(
-            &self.bytes(&Command::Busy)?,
-            rig.reply(),
-            QUESTION_TRIES,
-            |line| Ok(shot::parse_busy(line)),
-        )
+        question(link, rig, &self.bytes(&Command::Busy)?, |line| {
+            Ok(shot::parse_busy(line))
+        })
     }
 
     /// Sends a command that changes something: once. `NG` is explained by a status question.
@@ -54,7 +48,7 @@ impl ShotController {
         if link.ask(&bytes, rig.reply(), 1, |line| Ok(shot::parse_ack(line)))? {
             return Ok(());
         }
-        let name = String::from_utf8_lossy(&bytes).trim_end().to_string();
+        let name = named(&bytes);
         let why = match self.status(link, rig) {
             Ok(s) if s.busy => "the arms are still moving".into(),
             Ok(s) if s.limits != 0 => {
@@ -74,12 +68,10 @@ impl ShotController {
 
     /// The answer to `?:DW`, as text.
     fn speeds(&self, link: &mut Link, rig: &Rig) -> Result<String> {
-        link.ask(
-            &self.bytes(&Command::Ask(Query::Speeds))?,
-            rig.reply(),
-            QUESTION_TRIES,
-            |line| Ok(line.starts_with('S').then(|| line.to_string())),
-        )
+        let bytes = self.bytes(&Command::Ask(Query::Speeds))?;
+        question(link, rig, &bytes, |line| {
+            Ok(line.starts_with('S').then(|| line.to_string()))
+        })
     }
 
     /// A power cut sets the counters to 0 wherever the arms are, and a move after it "arrives" at a false place: only the speeds, set before homing
@@ -144,28 +136,15 @@ fn axes_of(rig: &Rig, mask: u8) -> String {
     names.join(" and ")
 }
 
-fn four(positions: &[i64]) -> [i64; AXES] {
-    let mut out = [0; AXES];
-    out.copy_from_slice(&positions[..AXES]);
-    out
-}
-
 impl Controller for ShotController {
     fn identify(&mut self, link: &mut Link, rig: &Rig) -> Result<String> {
-        // Answers to an earlier session that died may still be on their way.
-        link.wait(Duration::from_millis(20))?;
         let mut ask = |q| {
-            link.ask(
-                &self.bytes(&Command::Ask(q))?,
-                rig.reply(),
-                QUESTION_TRIES,
-                |line| {
-                    let plain =
-                        line.len() > 2 && line.bytes().all(|b| b.is_ascii_graphic() || b == b' ');
-                    let stray = line.starts_with('@') || shot::parse_status(line).is_some();
-                    Ok((plain && !stray).then(|| line.trim().to_string()))
-                },
-            )
+            question(link, rig, &self.bytes(&Command::Ask(q))?, |line| {
+                let plain =
+                    line.len() > 2 && line.bytes().all(|b| b.is_ascii_graphic() || b == b' ');
+                let stray = line.starts_with('@') || shot::parse_status(line).is_some();
+                Ok((plain && !stray).then(|| line.trim().to_string()))
+            })
         };
         let name = ask(Query::Name)?;
         let version = ask(Query::Version)?;
@@ -207,9 +186,7 @@ impl Controller for ShotController {
         seconds: f64,
     ) -> Result<[i64; AXES]> {
         let command = Command::MoveTo(Which::All, target.to_vec());
-        let name = String::from_utf8_lossy(&self.bytes(&command)?)
-            .trim_end()
-            .to_string();
+        let name = named(&self.bytes(&command)?);
         self.order(link, rig, &command)?;
         self.order(link, rig, &Command::Go)?;
         let deadline = Duration::from_secs_f64(seconds * 1.5 + 2.0);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use woven_bsdf::measured::csv::{Direct, Sample, Scan};
 use woven_bsdf::vec3::Vec3;
 
-use super::Measurement;
+use super::{Measurement, Value};
 use crate::error::{Error, Result};
 
 impl Measurement {
@@ -45,7 +45,8 @@ impl Measurement {
         write_whole(path, self.to_scan().to_text().as_bytes())
     }
 
-    /// Writes one text file for each incidence, as pgII does: `NAME_THETA_PHI.txt` beside `path`, lines of theta, phi and BSDF.
+    /// Writes one text file for each incidence, as pgII does: `NAME_THETA_PHI.txt` beside `path`, lines of theta, phi and BSDF, and for each
+    /// `NAME_THETA_PHI_sigma.txt` with the standard errors in the place of the values.
     /// Theta is the polar angle from the front normal (over 90 is transmission), as `pabopto2bsdf` expects. Returns the files written.
     ///
     /// # Errors
@@ -70,33 +71,46 @@ impl Measurement {
             .into_owned();
         let mut files = Vec::new();
         for (theta, phi) in incidences {
-            let mut text = String::new();
-            for c in &self.comments {
-                // A string takes everything that is written to it.
-                let _ = writeln!(text, "#comment \"{}\"", c.replace('"', "'"));
-            }
-            let _ = writeln!(text, "#sample_name \"{stem}\"");
-            let _ = writeln!(
-                text,
-                "#intheta {theta}\n#inphi {phi}\n#incident_side front\n#format: theta phi BSDF"
-            );
-            for s in self
-                .samples
-                .iter()
-                .filter(|s| (s.pose.theta_l, s.pose.phi_l) == (theta, phi))
-            {
-                let azimuth = s.pose.phi_v.rem_euclid(360.0);
-                let _ = writeln!(text, "{} {azimuth} {}", s.pose.theta_v, s.f);
-            }
             let file = path.with_file_name(format!(
                 "{stem}_{theta:06.2}_{:06.2}.txt",
                 phi.rem_euclid(360.0)
             ));
-            write_whole(&file, text.as_bytes())?;
-            files.push(file);
+            let values = self.pab_text(&stem, theta, phi, |s| s.f);
+            let errors = self.pab_text(&stem, theta, phi, |s| s.sigma);
+            let sigma = beside(&file, "_sigma");
+            write_whole(&file, values.as_bytes())?;
+            write_whole(&sigma, errors.as_bytes())?;
+            files.extend([file, sigma]);
         }
         Ok(files)
     }
+
+    /// The text of one incidence, with what `of` takes from each value.
+    fn pab_text(&self, stem: &str, theta: f64, phi: f64, of: impl Fn(&Value) -> f64) -> String {
+        let mut text = String::new();
+        for c in &self.comments {
+            // A string takes everything that is written to it.
+            let _ = writeln!(text, "#comment \"{}\"", c.replace('"', "'"));
+        }
+        let _ = writeln!(text, "#sample_name \"{stem}\"");
+        let _ = writeln!(
+            text,
+            "#intheta {theta}\n#inphi {phi}\n#incident_side front\n#format: theta phi BSDF"
+        );
+        let here = |s: &&Value| (s.pose.theta_l, s.pose.phi_l) == (theta, phi);
+        for s in self.samples.iter().filter(here) {
+            let azimuth = s.pose.phi_v.rem_euclid(360.0);
+            let _ = writeln!(text, "{} {azimuth} {}", s.pose.theta_v, of(s));
+        }
+        text
+    }
+}
+
+/// The same file with a word added to its name.
+pub(super) fn beside(path: &Path, word: &str) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let end = path.extension().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}{word}.{end}"))
 }
 
 /// Writes a whole file: a temporary file in the same folder, synced, then renamed.

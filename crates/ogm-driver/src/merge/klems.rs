@@ -5,25 +5,12 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Measurement;
-use super::export::write_whole;
+use super::export::{beside, write_whole};
 use crate::error::{Error, Result};
-use crate::plan::KLEMS_RINGS;
-
-/// Centres (θ, φ in degrees) and projected solid angles (sr) of the 145 patches.
-fn patches() -> Vec<(f64, f64, f64)> {
-    let mut out = Vec::new();
-    for (low, high, count) in KLEMS_RINGS {
-        let theta = if low == 0.0 { 0.0 } else { (low + high) / 2.0 };
-        let ring = std::f64::consts::PI
-            * (high.to_radians().sin().powi(2) - low.to_radians().sin().powi(2));
-        let n = f64::from(count);
-        out.extend((0..count).map(|k| (theta, f64::from(k) * 360.0 / n, ring / n)));
-    }
-    out
-}
+use crate::klems::{Patch, RINGS, centre, patches};
 
 /// A direction as whole numbers.
 type Key = (i64, i64);
@@ -41,38 +28,37 @@ fn key(theta: f64, phi: f64) -> Key {
 }
 
 impl Measurement {
-    /// The transmission matrix, 145 × 145 values in 1/sr, row by row.
+    /// The transmission matrix, 145 × 145 values in 1/sr with their standard errors, row by row.
     ///
     /// # Errors
     /// [`Error::Merge`] telling how many of the pairs were measured when it is not all of them.
-    pub fn klems_matrix(&self) -> Result<Vec<f64>> {
-        let mut known: BTreeMap<(Key, Key), f64> = BTreeMap::new();
+    pub fn klems_matrix(&self) -> Result<Vec<(f64, f64)>> {
+        let mut known: BTreeMap<(Key, Key), (f64, f64)> = BTreeMap::new();
         for s in &self.samples {
             let p = &s.pose;
-            known.insert((key(p.theta_l, p.phi_l), key(p.theta_v, p.phi_v)), s.f);
+            let directions = (key(p.theta_l, p.phi_l), key(p.theta_v, p.phi_v));
+            known.insert(directions, (s.f, s.sigma));
         }
         let mut straight = BTreeMap::new();
         for d in &self.direct {
-            straight.insert(
-                key(d.pose.theta_l, d.pose.phi_l),
-                (d.transmittance, d.scattered),
-            );
+            straight.insert(key(d.pose.theta_l, d.pose.phi_l), d);
         }
-        let all = patches();
+        let all: Vec<Patch> = patches().collect();
         let (mut values, mut missing) = (Vec::with_capacity(all.len() * all.len()), 0);
         for (o, outgoing) in all.iter().enumerate() {
             for (i, incident) in all.iter().enumerate() {
-                let light = key(incident.0, incident.1 + 180.0);
-                let view = key(180.0 - outgoing.0, outgoing.1);
+                let light = key(incident.theta, incident.phi + 180.0);
+                let view = key(180.0 - outgoing.theta, outgoing.phi);
                 let value = if i == o {
-                    straight
-                        .get(&light)
-                        .map(|(t, scattered)| t / incident.2 + scattered)
+                    straight.get(&light).map(|d| {
+                        let spread = |x: f64| x / incident.projected;
+                        (spread(d.transmittance) + d.scattered, spread(d.sigma))
+                    })
                 } else {
                     known.get(&(light, view)).copied()
                 };
                 missing += usize::from(value.is_none());
-                values.push(value.unwrap_or(0.0));
+                values.push(value.unwrap_or_default());
             }
         }
         if missing > 0 {
@@ -85,13 +71,27 @@ impl Measurement {
         Ok(values)
     }
 
-    /// Writes the Klems XML (front transmission, one band).
+    /// Writes the Klems XML (front transmission, one band), and beside it `NAME_sigma.xml` with the standard errors in the same places.
+    /// Returns both files.
     ///
     /// # Errors
     /// [`Error::Merge`] when pairs are missing, [`Error::Io`].
-    pub fn write_klems(&self, path: &Path) -> Result<()> {
+    pub fn write_klems(&self, path: &Path) -> Result<[PathBuf; 2]> {
         let values = self.klems_matrix()?;
-        let n = patches().len();
+        let beside = beside(path, "_sigma");
+        write_whole(
+            path,
+            self.klems_xml(path, values.iter().map(|v| v.0)).as_bytes(),
+        )?;
+        write_whole(
+            &beside,
+            self.klems_xml(&beside, values.iter().map(|v| v.1))
+                .as_bytes(),
+        )?;
+        Ok([path.into(), beside])
+    }
+
+    fn klems_xml(&self, path: &Path, values: impl Iterator<Item = f64>) -> String {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let escape = |s: &str| {
             s.replace('&', "&amp;")
@@ -112,8 +112,8 @@ impl Measurement {
              <AngleBasisName>LBNL/Klems Full</AngleBasisName>\n",
             escape(&name)
         );
-        for (low, high, count) in KLEMS_RINGS {
-            let theta = if low == 0.0 { 0.0 } else { (low + high) / 2.0 };
+        for (low, high, count) in RINGS {
+            let theta = centre(low, high);
             let _ = writeln!(
                 x,
                 "<AngleBasisBlock><Theta>{theta}</Theta><nPhis>{count}</nPhis><ThetaBounds><LowerTheta>{low}</LowerTheta><UpperTheta>{high}</UpperTheta></ThetaBounds></AngleBasisBlock>"
@@ -125,12 +125,13 @@ impl Measurement {
              <ColumnAngleBasis>LBNL/Klems Full</ColumnAngleBasis><RowAngleBasis>LBNL/Klems Full</RowAngleBasis>\
              <ScatteringDataType>BTDF</ScatteringDataType><ScatteringData>\n",
         );
-        for row in values.chunks(n) {
-            let words: Vec<String> = row.iter().map(|v| format!("{v:.6e}")).collect();
-            let _ = writeln!(x, "{},", words.join(", "));
+        let n = patches().count();
+        for (at, value) in values.enumerate() {
+            let end = if (at + 1) % n == 0 { ",\n" } else { ", " };
+            let _ = write!(x, "{value:.6e}{end}");
         }
         x.push_str("</ScatteringData></WavelengthDataBlock></WavelengthData>\n</Layer></Optical></WindowElement>\n");
-        write_whole(path, x.as_bytes())
+        x
     }
 }
 
@@ -177,8 +178,20 @@ mod tests {
         assert_eq!((m.samples.len(), m.direct.len()), (145 * 144, 145));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("k.xml");
-        m.write_klems(&path).unwrap();
+        let [_, beside] = m.write_klems(&path).unwrap();
         let read = Klems::read(&path).unwrap();
+        let errors = Klems::read(&beside).unwrap();
+        let error = |o, i| {
+            errors.value(
+                errors.block("Visible", Kind::TransmissionFront).unwrap(),
+                o,
+                i,
+            )
+        };
+        let normal = read.patches[0].projected_solid_angle();
+        assert!(
+            (error(1, 0) - 0.01).abs() < 1e-9 && (error(0, 0) * normal / 0.001 - 1.0).abs() < 1e-5
+        );
         let block = read.block("Visible", Kind::TransmissionFront).unwrap();
         for (o, po) in read.patches.iter().enumerate() {
             for (i, pi) in read.patches.iter().enumerate() {

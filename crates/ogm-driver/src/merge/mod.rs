@@ -62,6 +62,8 @@ pub struct Measurement {
     pub cut: Vec<Pose>,
     /// The detector's curvature that was found and taken out, and its standard error.
     pub linearity: Option<(f64, f64)>,
+    /// Count rate of the direct beam at the plan's f-number, counts a millisecond.
+    pub beam: f64,
     /// The white standard over what it should read, and the standard error.
     pub white: Option<(f64, f64)>,
 }
@@ -124,6 +126,7 @@ pub fn merge_readings(readings: &[&Reading], plan: &Plan, rig: &Rig) -> Result<M
     let scale = Scale::new(readings, plan, rig)?;
     let mut out = Measurement {
         linearity: Some((scale.linearity.x, scale.linearity.sigma)),
+        beam: scale.direct.value,
         ..Measurement::default()
     };
     let mut straight: Vec<(Pose, Rate)> = Vec::new();

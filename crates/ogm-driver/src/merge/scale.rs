@@ -17,7 +17,7 @@ pub(super) struct Scale {
     reference0: f64,
     /// Seconds and relative lamp power, by the reference readings.
     lamp: Vec<(f64, f64)>,
-    direct: Rate,
+    pub(super) direct: Rate,
 }
 
 impl Scale {

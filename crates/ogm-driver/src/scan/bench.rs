@@ -4,7 +4,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use super::Watcher;
 use crate::controller::{Controller, verify};
-use crate::detector::{Detector, Shot};
+use crate::detector::{Detector, Exposure, Shot};
 use crate::error::{Error, Result};
 use crate::log::{Reading, Record, What, Worker};
 use crate::plan::{Drift, Plan};
@@ -145,11 +145,12 @@ impl<'a> Bench<'a> {
                 None
             };
             let Some(ms) = ms else { return Ok(shots) };
-            let tag = tag(task.what, task.index, shots.len());
-            let f_number = plan.exposure.f_number;
-            let shot = self
-                .detector
-                .expose(&mut self.link, self.rig, tag, ms, f_number)?;
+            let exposure = Exposure {
+                tag: tag(task.what, task.index, shots.len()),
+                ms,
+                f_number: plan.exposure.f_number,
+            };
+            let shot = self.detector.expose(&mut self.link, self.rig, &exposure)?;
             shots.push(shot);
         }
     }

@@ -19,6 +19,8 @@ pub(super) fn run(
     torn_bytes: u64,
     watcher: &mut dyn Watcher,
 ) -> Result<usize> {
+    // Answers to an earlier session that died, or the welcome of a board that opening the port has reset, may still be on their way.
+    bench.link.wait(Duration::from_millis(20))?;
     let controller = bench.controller.identify(&mut bench.link, bench.rig)?;
     let detector = bench.detector.identify(&mut bench.link, bench.rig)?;
     let lamp_s = warm_up(bench, watcher)?;

@@ -133,6 +133,27 @@ impl Bench {
         busy
     }
 
+    /// Stops every arm where it is.
+    pub fn freeze(&mut self, now: f64) {
+        for m in &mut self.motors {
+            m.freeze(now);
+        }
+    }
+
+    /// The controller lost its power for an instant: arms stopped, counters 0, outputs off.
+    pub fn lose_power(&mut self, now: f64) {
+        for m in &mut self.motors {
+            m.freeze(now);
+            m.zero_here(now);
+        }
+        self.outputs = 0;
+    }
+
+    /// What the controller believes of every arm, pulses.
+    pub fn counts(&self) -> [i64; AXES] {
+        std::array::from_fn(|i| self.motors[i].count())
+    }
+
     /// The pose the arms really have.
     pub fn true_pose(&mut self, now: f64) -> Pose {
         self.update(now);
@@ -166,50 +187,61 @@ impl Bench {
             * (1.0 + w.drift_per_hour * now / 3600.0)
     }
 
-    /// Exposes for `exposure_ms` at `f_number`, beginning at `now`. `tag` is the counter of the noise.
-    pub fn expose(&mut self, now: f64, exposure_ms: f64, f_number: f64, tag: u64) -> Shot {
+    /// Counts of an ideal, endless detector exposed for `exposure_ms` at `f_number`, beginning at `now`. `tag` names the exposure.
+    pub fn light(&mut self, now: f64, exposure_ms: f64, f_number: f64, tag: u64) -> f64 {
         let moving = self.update(now);
         let pose = self.true_pose(now);
         if let Some(list) = &mut self.exposures {
             list.push((tag, pose, moving));
         }
-        let middle = now + exposure_ms / 2000.0;
-        let lamp = self.lamp(middle);
-        let d = &self.rig.detector;
+        if self.outputs & 1 == 0 {
+            return 0.0;
+        }
         let holder = match self.outputs & 6 {
             0 => Holder::Sample,
             2 => Holder::Empty,
             _ => Holder::White,
         };
-        let open = self.outputs & 1 != 0;
-        let share = if open {
-            flux(&*self.sample, holder, pose, d.aperture_deg, d.beam_half_deg)
+        let d = &self.rig.detector;
+        let share = flux(&*self.sample, holder, pose, d.aperture_deg, d.beam_half_deg);
+        let stop = (4.0 / f_number.max(0.5)).powi(2);
+        let lamp = self.lamp(now + exposure_ms / 2000.0);
+        self.wrong.counts_per_ms * exposure_ms * stop * share * lamp
+    }
+
+    /// Counts of the diode that watches the lamp.
+    pub fn reference(&self, now: f64, tag: u64) -> i64 {
+        let lamp = if self.wrong.reference_diode {
+            self.lamp(now)
+        } else {
+            1.0
+        };
+        let mut noise = Noise::at(&[self.wrong.seed, tag, 0x0072_6566]);
+        let noise = if self.wrong.noise {
+            noise.normal()
         } else {
             0.0
         };
-        let stop = (4.0 / f_number.max(0.5)).powi(2);
-        let light = self.wrong.counts_per_ms * exposure_ms * stop * share * lamp;
-        let mut noise = Noise::at(&[self.wrong.seed, tag, (exposure_ms * 1000.0) as u64]);
-        let mut counts = light * (1.0 - self.wrong.nonlinearity * (light / d.full_scale).min(1.0));
-        let dark = self.wrong.dark_rate * exposure_ms;
-        let mut reference = 800_000.0
-            * if self.wrong.reference_diode {
-                lamp
-            } else {
-                1.0
-            };
-        if self.wrong.noise {
+        (800_000.0 * lamp + 80.0 * noise).round() as i64
+    }
+
+    /// Exposes the photodiode for `exposure_ms` at `f_number`, beginning at `now`. `tag` is the counter of the noise.
+    pub fn expose(&mut self, now: f64, exposure_ms: f64, f_number: f64, tag: u64) -> Shot {
+        let light = self.light(now, exposure_ms, f_number, tag);
+        let (d, wrong) = (&self.rig.detector, &self.wrong);
+        let mut counts = light * (1.0 - wrong.nonlinearity * (light / d.full_scale).min(1.0));
+        let dark = wrong.dark_rate * exposure_ms;
+        if wrong.noise {
             // Shot noise of light and dark current, plus the read noise.
-            let variance = (counts + dark) / d.electrons_per_count + d.read_noise * d.read_noise;
-            counts += noise.normal() * variance.sqrt();
-            reference += noise.normal() * 80.0;
+            let variance = (counts + dark) / d.electrons_per_count + d.read_noise.powi(2);
+            let key = [wrong.seed, tag, (exposure_ms * 1000.0) as u64];
+            counts += Noise::at(&key).normal() * variance.sqrt();
         }
-        counts += self.wrong.dark_offset + dark;
-        let saturated = counts >= d.full_scale;
+        counts += wrong.dark_offset + dark;
         Shot {
             counts: counts.clamp(-1e6, d.full_scale).round() as i64,
-            reference: reference.round() as i64,
-            saturated,
+            reference: self.reference(now + exposure_ms / 2000.0, tag),
+            saturated: counts >= d.full_scale,
         }
     }
 }

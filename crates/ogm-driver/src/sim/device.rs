@@ -103,6 +103,11 @@ impl Device {
         device
     }
 
+    /// The device's own clock: the simulation's, and what it has jumped ahead.
+    pub fn time(&self, now: f64) -> f64 {
+        now + self.jump
+    }
+
     /// Whether the port has gone away.
     pub fn vanished(&self) -> bool {
         self.vanished

@@ -3,6 +3,7 @@
 use super::bench::Bench;
 use super::device::{Answer, Firmware};
 use super::fault::Fault;
+use super::motor::Motor;
 use crate::pose::AXES;
 use crate::protocol::grbl::{self, Line, RealTime, Report, State};
 
@@ -20,15 +21,9 @@ pub(crate) struct GrblFirmware {
 
 impl GrblFirmware {
     pub(crate) fn new() -> Self {
-        let settings = vec![
-            (10, 1000),
-            (20, 1000),
-            (21, 1000),
-            (22, 1000),
-            (130, 360_000),
-            (131, 360_000),
-            (132, 360_000),
-        ];
+        let switched_on = [10, 20, 21, 22].map(|n| (n, 1000));
+        let travel = [130, 131, 132].map(|n| (n, 360_000));
+        let settings = [&switched_on[..], &travel].concat();
         GrblFirmware {
             state: State::Alarm,
             pending_alarm: None,
@@ -44,11 +39,7 @@ impl GrblFirmware {
             .collect();
         grbl::format_report(&Report {
             state: self.state,
-            machine: bench
-                .motors
-                .iter()
-                .map(super::motor::Motor::count)
-                .collect(),
+            machine: bench.counts().to_vec(),
             pins,
         })
     }
@@ -107,9 +98,7 @@ impl GrblFirmware {
     }
 
     fn alarm(&mut self, code: u32, now: f64, bench: &mut Bench) -> Vec<Answer> {
-        for m in &mut bench.motors {
-            m.freeze(now);
-        }
+        bench.freeze(now);
         self.state = State::Alarm;
         self.locked = true;
         vec![
@@ -160,14 +149,9 @@ impl GrblFirmware {
                 }
                 self.locked = false;
                 self.state = State::Home;
-                for i in 0..AXES {
-                    let axis = &bench.rig.axes[i];
-                    let (start, top, ramp) = (
-                        f64::from(axis.start_pps()),
-                        f64::from(axis.speed_pps()),
-                        f64::from(axis.ramp_ms) / 1000.0,
-                    );
-                    bench.motors[i].go_home(now, start, top, ramp);
+                for (motor, axis) in bench.motors.iter_mut().zip(&bench.rig.axes) {
+                    let (start, top) = (axis.start_pps().into(), axis.speed_pps().into());
+                    motor.go_home(now, start, top, f64::from(axis.ramp_ms) / 1000.0);
                 }
                 return Ok(Vec::new()); // "ok" comes when all are home
             }
@@ -197,16 +181,11 @@ impl GrblFirmware {
                 if moving {
                     return Err(8);
                 }
-                self.state = if self.state == State::Check {
-                    State::Idle
-                } else {
-                    State::Check
+                let (state, word) = match self.state {
+                    State::Check => (State::Idle, "[MSG:Disabled]"),
+                    _ => (State::Check, "[MSG:Enabled]"),
                 };
-                let word = if self.state == State::Check {
-                    "[MSG:Enabled]"
-                } else {
-                    "[MSG:Disabled]"
-                };
+                self.state = state;
                 return Ok(vec![Answer::now(now, word.into()), ok[0].clone()]);
             }
             Line::Sleep => self.state = State::Sleep,
@@ -229,11 +208,8 @@ impl GrblFirmware {
                 };
             }
             Line::Dwell => {
-                let end = bench
-                    .motors
-                    .iter()
-                    .filter_map(super::motor::Motor::end)
-                    .fold(now, f64::max);
+                let ends = bench.motors.iter().filter_map(Motor::end);
+                let end = ends.fold(now, f64::max);
                 return Ok(vec![Answer {
                     due: end + 0.01,
                     text: "ok".into(),
@@ -264,11 +240,7 @@ impl Firmware for GrblFirmware {
             Some(Fault::PowerCycle) => {
                 *mishap = None;
                 *self = GrblFirmware::new();
-                for m in &mut bench.motors {
-                    m.freeze(now);
-                    m.zero_here(now);
-                }
-                bench.outputs = 0;
+                bench.lose_power(now);
                 return vec![Answer::now(now, WELCOME.into())];
             }
             _ => {}
@@ -293,18 +265,14 @@ impl Firmware for GrblFirmware {
             }
             RealTime::JogCancel => {
                 if self.state == State::Jog {
-                    for m in &mut bench.motors {
-                        m.freeze(now);
-                    }
+                    bench.freeze(now);
                     self.state = State::Idle;
                 }
                 Vec::new()
             }
             RealTime::Hold | RealTime::Door => {
                 if matches!(self.state, State::Jog | State::Run) {
-                    for m in &mut bench.motors {
-                        m.freeze(now);
-                    }
+                    bench.freeze(now);
                     self.state = if byte == RealTime::Door {
                         State::Door(0)
                     } else {
@@ -321,23 +289,13 @@ impl Firmware for GrblFirmware {
             }
             RealTime::Reset => {
                 let lost = moving;
-                for m in &mut bench.motors {
-                    m.freeze(now);
+                bench.freeze(now);
+                let mut out = Vec::new();
+                if lost {
+                    let code = if self.state == State::Home { 6 } else { 3 };
+                    out.push(Answer::now(now, format!("ALARM:{code}")));
                 }
-                let mut out = if lost {
-                    vec![Answer::now(
-                        now,
-                        if self.state == State::Home {
-                            "ALARM:6"
-                        } else {
-                            "ALARM:3"
-                        }
-                        .into(),
-                    )]
-                } else {
-                    Vec::new()
-                };
-                self.locked = lost || self.locked;
+                self.locked |= lost;
                 self.state = if self.locked {
                     State::Alarm
                 } else {

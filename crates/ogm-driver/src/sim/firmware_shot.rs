@@ -149,11 +149,7 @@ impl ShotFirmware {
             }
             Command::MoveTo(w, to) => return self.stage(*w, |k, _| to[k]),
             Command::MoveBy(w, by) => {
-                let counts: Vec<i64> = bench
-                    .motors
-                    .iter()
-                    .map(super::motor::Motor::count)
-                    .collect();
+                let counts = bench.counts();
                 return self.stage(*w, |k, a| counts[a] + by[k]);
             }
             Command::Jog(w, senses) => {
@@ -201,12 +197,8 @@ impl ShotFirmware {
         let limits = (0..n)
             .filter(|&a| bench.motors[a].at_limit)
             .fold(0, |m, a| m | (1 << a));
-        let positions = bench.motors[..n]
-            .iter()
-            .map(super::motor::Motor::count)
-            .collect();
         shot::format_status(&Status {
-            positions,
+            positions: bench.counts()[..n].to_vec(),
             accepted: self.accepted,
             limits,
             busy,
@@ -239,11 +231,7 @@ impl Firmware for ShotFirmware {
             Some(Fault::PowerCycle) => {
                 *mishap = None;
                 *self = ShotFirmware::new(self.model);
-                for m in &mut bench.motors {
-                    m.freeze(now);
-                    m.zero_here(now);
-                }
-                bench.outputs = 0;
+                bench.lose_power(now);
             }
             _ => {}
         }

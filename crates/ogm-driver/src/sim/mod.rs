@@ -1,6 +1,7 @@
 //! The simulated rig, a device of equal rank: arms with speed and limits, a lamp, a noisy detector, two controller languages, faults on demand.
 
 pub mod bench;
+pub mod camera;
 pub mod device;
 pub mod fabric;
 pub mod fault;

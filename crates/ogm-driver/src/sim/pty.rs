@@ -14,11 +14,28 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::device::Device;
 
+/// The clock of a simulation that runs beside the wall's.
+#[derive(Debug, Clone, Copy)]
+pub struct Clock {
+    begun: Instant,
+    /// How many times faster than the wall's.
+    pub speed: f64,
+}
+
+impl Clock {
+    /// Seconds of the simulation.
+    pub fn now(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64() * self.speed
+    }
+}
+
 /// A running simulated rig. Dropping it stops the thread and closes the port.
 pub struct PtyRig {
     port: String,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<io::Result<()>>>,
+    /// The simulation's clock.
+    pub clock: Clock,
     /// The device, to look inside from a test.
     pub device: Arc<Mutex<Device>>,
 }
@@ -39,14 +56,19 @@ impl PtyRig {
         fcntl_setfl(&master, fcntl_getfl(&master)? | OFlags::NONBLOCK)?;
         let stop = Arc::new(AtomicBool::new(false));
         let device = Arc::new(Mutex::new(device));
+        let clock = Clock {
+            begun: Instant::now(),
+            speed,
+        };
         let (flag, shared) = (stop.clone(), device.clone());
         let thread = std::thread::Builder::new()
             .name("simulated rig".into())
-            .spawn(move || serve(&master, &shared, &flag, speed))?;
+            .spawn(move || serve(&master, &shared, &flag, clock))?;
         Ok(PtyRig {
             port,
             stop,
             thread: Some(thread),
+            clock,
             device,
         })
     }
@@ -75,10 +97,9 @@ fn serve(
     master: &OwnedFd,
     device: &Mutex<Device>,
     stop: &AtomicBool,
-    speed: f64,
+    clock: Clock,
 ) -> io::Result<()> {
-    let begun = Instant::now();
-    let now = || begun.elapsed().as_secs_f64() * speed;
+    let now = || clock.now();
     let mut pending: Vec<u8> = Vec::new();
     let mut chunk = [0_u8; 4096];
     while !stop.load(Ordering::SeqCst) {
@@ -99,7 +120,7 @@ fn serve(
             }
         }
         // At most 5 ms, so that a stop is noticed; less when an answer is due.
-        let wait = due.map_or(5e-3, |t| ((t - now()) / speed).clamp(0.0, 5e-3));
+        let wait = due.map_or(5e-3, |t| ((t - now()) / clock.speed).clamp(0.0, 5e-3));
         let wait = if pending.is_empty() {
             wait
         } else {

@@ -160,6 +160,17 @@ pub(crate) fn nearest(table: &Table, ray: &Ray, tmin: f32, tmax: f32) -> Option<
 /// Share of light that passes straight from the ray's origin to distance `tmax`: the product of the gaps of every
 /// sheet between, in the order in which they are found.
 pub(crate) fn transmittance(table: &Table, ray: &Ray, tmax: f32, rng: &mut Rng) -> f32 {
+    product(table, ray, tmax, FAINT, || rng.coin())
+}
+
+/// The same without a coin for faint light.
+pub(crate) fn transmittance_exact(table: &Table, ray: &Ray, tmax: f32) -> f32 {
+    product(table, ray, tmax, 1e-12, || 0.0)
+}
+
+/// The product of the gaps; below `faint` it ends with an even coin.
+#[inline(always)]
+fn product(table: &Table, ray: &Ray, tmax: f32, faint: f32, mut coin: impl FnMut() -> f32) -> f32 {
     let mut product = 1.0;
     if table.bvh.nodes.is_empty() {
         return product;
@@ -200,8 +211,8 @@ pub(crate) fn transmittance(table: &Table, ray: &Ray, tmax: f32, rng: &mut Rng) 
             if product <= 0.0 {
                 return 0.0;
             }
-            if product < FAINT {
-                if rng.coin() < 0.5 {
+            if product < faint {
+                if coin() < 0.5 {
                     return 0.0;
                 }
                 product *= 2.0;

@@ -15,10 +15,8 @@ use crate::rng::Rng;
 use crate::scene::LAYERS;
 use crate::table::{MATT, MaterialRow, NONE, TRANSMITS, Table};
 
-/// Sheets at which a camera ray is lit; beyond it goes on dark (the product of as many gaps is below any noise).
-pub(crate) const CROSSINGS: u32 = 64;
-/// Sets of random numbers: 0 camera, 1.. crossings, from here two a bounce.
-pub(crate) const BOUNCES: u32 = CROSSINGS + 1;
+/// Sheets at which a camera ray is lit (random numbers: set 0 is the camera's, then one set a crossing); beyond it goes on dark (the product of as many gaps is below any noise).
+const CROSSINGS: u32 = 64;
 
 /// A path survives with the probability of what it carries times this. Measured on the bench scene (relMSE x CPU-s at 160 x 120,
 /// 32 spp; `examples/measure.rs`): 1 gives 0.095, 2 0.070, 3 0.065, 5 0.076, no roulette 0.078.
@@ -62,11 +60,33 @@ pub(crate) struct Sample {
 
 /// A point from which a path goes on.
 #[derive(Clone, Copy)]
-struct Vertex {
-    s: Surface,
+pub(super) struct Vertex {
+    pub s: Surface,
     at: Place,
-    wo: Vec3,
-    throughput: Vec3,
+    pub wo: Vec3,
+    pub throughput: Vec3,
+}
+
+/// The second point of a path, and the light that it scatters on: what the pixels of a group share.
+#[derive(Clone, Copy)]
+pub(super) struct Second {
+    pub s: Surface,
+    /// Product of the gaps on the way to it.
+    pub passed: f32,
+    /// Light from a sampled light.
+    pub lit: Incident,
+    /// Where the path went on to, in the world.
+    pub wi: Vec3,
+    /// What it met there, times cosine over density, by layer.
+    pub beyond: [Vec3; LAYERS],
+}
+
+/// A sample of a pixel, its indirect light still to be gathered.
+pub(super) struct Begun {
+    pub sample: Sample,
+    /// Where the camera ray is scattered.
+    pub first: Option<Vertex>,
+    pub second: Option<Second>,
 }
 
 fn towards_eye(s: &Surface, d: Vec3) -> Vec3 {
@@ -93,8 +113,34 @@ fn shares(m: &MaterialRow) -> bool {
     m.flags & MATT == 0
 }
 
-/// Light that reaches the place from a sampled light and is scattered towards `wo` (in the sheet's frame).
-fn direct(
+/// Light that reaches a place from a sampled light.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Incident {
+    /// Where it comes from, in the world.
+    pub wi: Vec3,
+    /// Radiance times cosine over density: what the value of the scattering is to be multiplied with.
+    pub light: Vec3,
+    /// Density of the sampling if scattering shares the light with it, else 0.
+    pub pdf: f32,
+    pub layer: u32,
+}
+
+impl Incident {
+    /// What is scattered towards `wo` (in the sheet's frame).
+    #[inline(always)]
+    pub(super) fn scattered(&self, m: &MaterialRow, s: &Surface, wo: Vec3) -> Vec3 {
+        let wi = s.local(self.wi);
+        let mut value = surface::evaluate(m, s, wi, wo) * self.light;
+        if self.pdf > 0.0 {
+            value *= heuristic(self.pdf, surface::density(m, wo, wi));
+        }
+        value
+    }
+}
+
+/// Samples a light for a place that is seen from `wo` (in the sheet's frame): the light, and what is scattered towards
+/// `wo`; nothing where that is black.
+fn incident(
     table: &Table,
     m: &MaterialRow,
     s: &Surface,
@@ -102,19 +148,26 @@ fn direct(
     wo: Vec3,
     u: [f32; 4],
     rng: &mut Rng,
-) -> Option<(u32, Vec3)> {
+) -> Option<(Incident, Vec3)> {
     let l = light::sample(table, at, [u[0], u[1], u[2]])?;
-    let wi = s.local(l.wi);
-    let mut value = surface::evaluate(m, s, wi, wo) * l.radiance * (wi.z.abs() / l.pdf);
-    if l.meets && (l.shared || shares(m)) {
-        value *= heuristic(l.pdf, surface::density(m, wo, wi));
-    }
+    let mut found = Incident {
+        wi: l.wi,
+        light: l.radiance * (s.local(l.wi).z.abs() / l.pdf),
+        pdf: if l.meets && (l.shared || shares(m)) {
+            l.pdf
+        } else {
+            0.0
+        },
+        layer: l.layer,
+    };
+    let value = found.scattered(m, s, wo);
     if value.max_element() <= 0.0 {
         return None;
     }
     let ray = Ray::new(s.leave(table, l.wi), l.wi);
     let passed = transmittance(table, &ray, l.distance - (1e-4 + 1e-4 * l.distance), rng);
-    Some((l.layer, value * passed))
+    found.light *= passed;
+    Some((found, value * passed))
 }
 
 /// The camera ray of pixel (x, y).
@@ -131,8 +184,15 @@ fn camera_ray(view: &View, x: u32, y: u32, u: [f32; 4]) -> Ray {
     Ray::new(view.eye + lens, (d * view.focus - lens).normalize())
 }
 
-/// Sample `index` of pixel (x, y).
-pub(crate) fn sample(table: &Table, view: &View, x: u32, y: u32, index: u32) -> Sample {
+/// Sample `index` of pixel (x, y), as far as a pixel goes alone; `paths` are the random numbers of its path.
+pub(super) fn begin(
+    table: &Table,
+    view: &View,
+    x: u32,
+    y: u32,
+    index: u32,
+    paths: &mut Rng,
+) -> Begun {
     let mut out = Sample::default();
     let mut rng = Rng::new(x, y, index, view.seed);
     let ray = camera_ray(view, x, y, rng.set(0));
@@ -173,8 +233,8 @@ pub(crate) fn sample(table: &Table, view: &View, x: u32, y: u32, index: u32) -> 
         if weight > 0.0 && view.depth > 0 {
             let at = place(table, m, &s, ray.d);
             let u = rng.set(1 + crossing);
-            if let Some((layer, value)) = direct(table, m, &s, &at, wo, u, &mut rng) {
-                add(&mut out.light, layer, value * passed);
+            if let Some((l, value)) = incident(table, m, &s, &at, wo, u, &mut rng) {
+                add(&mut out.light, l.layer, value * passed);
             }
             // Reservoir of one: each crossing is kept in proportion to its weight.
             all_weights += weight;
@@ -206,11 +266,16 @@ pub(crate) fn sample(table: &Table, view: &View, x: u32, y: u32, index: u32) -> 
         }
         tmin = hit.t * (1.0 + 2e-6) + table.globals.offset;
     }
-    if let Some(mut v) = chosen {
+    let mut second = None;
+    if let Some(v) = &mut chosen {
         v.throughput *= all_weights / chosen_weight;
-        follow(table, view, v, &mut rng, &mut out.light);
+        second = follow(table, view, v, paths, &mut out.light);
     }
-    out
+    Begun {
+        sample: out,
+        first: chosen,
+        second,
+    }
 }
 
 fn reflectance(m: &MaterialRow, s: &Surface) -> Vec3 {
@@ -225,38 +290,65 @@ fn add(light: &mut [Vec3; LAYERS], layer: u32, value: Vec3) {
     light[(layer as usize).min(LAYERS - 1)] += value;
 }
 
-/// Follows the path that scatters at `v` until it ends.
-fn follow(table: &Table, view: &View, mut v: Vertex, rng: &mut Rng, light: &mut [Vec3; LAYERS]) {
+/// Follows the path that scatters at `first` until it ends. What it meets without a second scattering is added to
+/// `light`; what is scattered at the second point is returned, unless only this very path may use it.
+fn follow(
+    table: &Table,
+    view: &View,
+    first: &Vertex,
+    rng: &mut Rng,
+    light: &mut [Vec3; LAYERS],
+) -> Option<Second> {
+    let mut v = *first;
+    let mut second: Option<Second> = None;
+    // What the path carries from the second point on, and whether other paths may have it.
+    let mut tail = Vec3::ONE;
+    let mut lent = false;
     for bounce in 1..=view.depth {
         let m = &table.materials[v.s.material as usize];
         let mixed = shares(m);
         // The last ray could only meet lights that sampling has already counted.
         if bounce == view.depth && !mixed && table.globals.soft_lights == 0 {
-            return;
+            return second;
         }
-        let u = rng.set(BOUNCES + 2 * bounce);
+        let u = rng.set(2 * bounce);
         let wi = surface::sample(m, v.wo, Vec3::new(u[0], u[1], u[2]));
         let pdf = surface::density(m, v.wo, wi);
         if pdf <= 1e-12 {
-            return;
+            return second;
         }
-        v.throughput *= surface::evaluate(m, &v.s, wi, v.wo) * (wi.z.abs() / pdf);
+        let f = surface::evaluate(m, &v.s, wi, v.wo);
+        v.throughput *= f * (wi.z.abs() / pdf);
         // Russian roulette by what the path still carries.
         let q = v.throughput.max_element() * ROULETTE;
         if q <= 0.0 {
-            return;
+            return second;
         }
+        let mut kept = 1.0;
         if bounce > 1 && q < 1.0 {
             if u[3] >= q {
-                return;
+                return second;
             }
-            v.throughput *= 1.0 / q;
+            kept = 1.0 / q;
+            v.throughput *= kept;
         }
         let d = v.s.world(wi);
+        let away = wi.z.abs() / pdf * kept;
+        if let (2, Some(y)) = (bounce, &mut second) {
+            y.wi = d;
+            tail = Vec3::splat(away);
+        } else {
+            tail *= f * away;
+        }
         let ray = Ray::new(v.s.leave(table, d), d);
         let mut tmin = 0.0;
+        let mut passed = 1.0;
+        let mut give = |layer: u32, value: Vec3, tail: Vec3, alone: Vec3| match &mut second {
+            Some(y) if lent => add(&mut y.beyond, layer, value * tail),
+            _ => add(light, layer, value * alone),
+        };
         // Straight on through gaps, each by a coin.
-        let (hit, s) = loop {
+        let (hit, s, gap) = loop {
             let Some(hit) = nearest(table, &ray, tmin, FAR) else {
                 let sky = table.globals.sky_light;
                 if sky != NONE {
@@ -268,19 +360,17 @@ fn follow(table: &Table, view: &View, mut v: Vertex, rng: &mut Rng, light: &mut 
                     } else {
                         0.0
                     };
-                    add(
-                        light,
-                        table.globals.sky_layer,
-                        light::sky(table, d) * v.throughput * share,
-                    );
+                    let value = light::sky(table, d) * share;
+                    give(table.globals.sky_layer, value, tail, v.throughput);
                 }
-                return;
+                return second;
             };
             let s = surface::surface(table, &hit);
             let gap = surface::gap(&table.materials[s.material as usize], &s, d);
             if gap <= 0.0 || (gap < 1.0 && rng.coin() >= gap) {
-                break (hit, s);
+                break (hit, s, gap);
             }
+            passed *= gap;
             tmin = hit.t * (1.0 + 2e-6) + table.globals.offset;
         };
         let m = &table.materials[s.material as usize];
@@ -294,19 +384,32 @@ fn follow(table: &Table, view: &View, mut v: Vertex, rng: &mut Rng, light: &mut 
                     share = if both { heuristic(pdf, met) } else { 0.0 };
                 }
             }
-            add(light, m.layer, emitted * v.throughput * share);
+            give(m.layer, emitted * share, tail, v.throughput);
         }
         if bounce == view.depth || m.emission[3] <= 0.0 {
-            return;
+            return second;
         }
         let at = place(table, m, &s, d);
         let wo = s.local(-d);
-        let u = rng.set(BOUNCES + 2 * bounce + 1);
+        let u = rng.set(2 * bounce + 1);
+        let lit = incident(table, m, &s, &at, wo, u, rng);
         // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
-        let gap = surface::gap(m, &s, d);
-        v.throughput *= 1.0 / (1.0 - gap).max(1e-6);
-        if let Some((layer, value)) = direct(table, m, &s, &at, wo, u, rng) {
-            add(light, layer, value * v.throughput);
+        let yarn = 1.0 / (1.0 - gap).max(1e-6);
+        v.throughput *= yarn;
+        if bounce > 1 {
+            tail *= yarn;
+            if let Some((l, value)) = lit {
+                give(l.layer, value, tail, v.throughput);
+            }
+        } else {
+            lent = !shares(m);
+            second = Some(Second {
+                s,
+                passed,
+                lit: lit.map(|l| l.0).unwrap_or_default(),
+                wi: d,
+                beyond: [Vec3::ZERO; LAYERS],
+            });
         }
         v = Vertex {
             s,
@@ -315,4 +418,5 @@ fn follow(table: &Table, view: &View, mut v: Vertex, rng: &mut Rng, light: &mut 
             throughput: v.throughput,
         };
     }
+    second
 }

@@ -9,6 +9,7 @@ use super::pipeline::Pipeline;
 use crate::accumulate::PixelSum;
 use crate::bvh::{EMPTY, Node, Packet};
 use crate::cpu::path::View;
+use crate::cpu::share::shift;
 use crate::table::{Globals, LightRow, MaterialRow, Shade, Table};
 
 /// What one submit is told.
@@ -31,22 +32,17 @@ pub struct Frame {
     pub depth: u32,
     pub lens_y: [f32; 3],
     pub seed: u32,
-    pub first: u32,
-    pub count: u32,
+    pub index: u32,
+    pub left: u32,
+    pub above: u32,
     pub block: u32,
-    pub blocks: u32,
     pub globals: Globals,
 }
 
 impl Frame {
-    pub(crate) fn new(
-        v: &View,
-        globals: &Globals,
-        first: u32,
-        count: u32,
-        block: u32,
-        blocks: u32,
-    ) -> Self {
+    /// Sample `index`, the blocks from `block` on.
+    pub(crate) fn new(v: &View, globals: &Globals, index: u32, block: u32) -> Self {
+        let (left, above) = shift(index);
         let a = |v: Vec3| v.to_array();
         Self {
             eye: a(v.eye),
@@ -61,10 +57,10 @@ impl Frame {
             depth: v.depth,
             lens_y: a(v.lens_y),
             seed: v.seed,
-            first,
-            count,
+            index,
+            left,
+            above,
             block,
-            blocks,
             globals: *globals,
         }
     }

@@ -23,6 +23,7 @@ pub fn source() -> String {
         include_str!("../shader/rect.wgsl"),
         include_str!("../shader/light.wgsl"),
         include_str!("../shader/path.wgsl"),
+        include_str!("../shader/share.wgsl"),
     ]
     .join("\n")
 }

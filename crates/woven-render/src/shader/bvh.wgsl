@@ -142,8 +142,9 @@ fn nearest(ray: Ray, tmin: f32, tmax: f32) -> Hit {
     return hit;
 }
 
-// Share of light that passes straight from the ray's origin to distance tmax.
-fn transmittance(ray: Ray, tmax: f32, rng: ptr<function, Rng>) -> f32 {
+// Share of light that passes straight from the ray's origin to distance tmax. Below `faint` an even coin ends it; an
+// exact one just ends there.
+fn transmittance(ray: Ray, tmax: f32, faint: f32, exact: bool, rng: ptr<function, Rng>) -> f32 {
     var product = 1.0;
     stack[0] = 0u;
     var top = 1u;
@@ -176,7 +177,10 @@ fn transmittance(ray: Ray, tmax: f32, rng: ptr<function, Rng>) -> f32 {
             if (product <= 0.0) {
                 return 0.0;
             }
-            if (product < FAINT) {
+            if (product < faint) {
+                if (exact) {
+                    return 0.0;
+                }
                 if (rng_coin(rng) < 0.5) {
                     return 0.0;
                 }

@@ -1,7 +1,6 @@
-// One sample of one pixel; the pair of cpu/path.rs.
+// One sample of one pixel, as far as a pixel goes alone; the pair of cpu/path.rs.
 
 const CROSSINGS: u32 = 64u;
-const BOUNCES: u32 = 65u;
 const ROULETTE: f32 = 3.0;
 
 struct Vertex {
@@ -9,6 +8,22 @@ struct Vertex {
     at: Place,
     wo: vec3<f32>,
     throughput: vec3<f32>,
+}
+
+struct Second {
+    s: Surface,
+    passed: f32,
+    lit: Incident,
+    wi: vec3<f32>,
+    beyond: array<vec3<f32>, LAYERS>,
+}
+
+struct Begun {
+    taken: Taken,
+    has_first: bool,
+    first: Vertex,
+    has_second: bool,
+    second: Second,
 }
 
 // What one sample adds.
@@ -28,6 +43,10 @@ fn towards_eye(s: Surface, d: vec3<f32>) -> vec3<f32> {
     return select(s.fz, -s.fz, dot(s.fz, d) > 0.0);
 }
 
+fn add_beyond(y: ptr<function, Second>, layer: u32, value: vec3<f32>) {
+    (*y).beyond[min(layer, LAYERS - 1u)] += value;
+}
+
 fn place_of(m: u32, s: Surface, d: vec3<f32>) -> Place {
     return light_place(s.p, towards_eye(s, d), (materials[m].flags & TRANSMITS) != 0u);
 }
@@ -41,28 +60,38 @@ fn shares(m: u32) -> bool {
     return (materials[m].flags & MATT) == 0u;
 }
 
-struct Direct {
+struct Incident {
+    wi: vec3<f32>,
+    // Radiance times cosine over density.
+    light: vec3<f32>,
+    // Density of the sampling if scattering shares the light with it, else 0.
+    pdf: f32,
     layer: u32,
+    // What is scattered towards the own path.
     value: vec3<f32>,
 }
 
-fn direct(m: u32, s: Surface, at: Place, wo: vec3<f32>, u: vec4<f32>, rng: ptr<function, Rng>) -> Direct {
+fn incident(m: u32, s: Surface, at: Place, wo: vec3<f32>, u: vec4<f32>, rng: ptr<function, Rng>) -> Incident {
+    var found: Incident;
     let l = light_sample(at, u.xyz);
     if (l.pdf <= 0.0) {
-        return Direct(0u, vec3<f32>(0.0));
+        return found;
     }
     let wi = local(s, l.wi);
     let b = scattering(m, s, wo, wi, false, vec3<f32>(0.0));
-    var value = b.f * l.radiance * (abs(wi.z) / l.pdf);
+    let light = l.radiance * (abs(wi.z) / l.pdf);
+    var value = b.f * light;
+    var pdf = 0.0;
     if (l.meets && (l.sampled_by_all || shares(m))) {
+        pdf = l.pdf;
         value *= heuristic(l.pdf, b.pdf);
     }
     if (max3(value) <= 0.0) {
-        return Direct(0u, vec3<f32>(0.0));
+        return found;
     }
     let ray = ray_new(leave(s, l.wi), l.wi);
-    let passed = transmittance(ray, l.distance - (1e-4 + 1e-4 * l.distance), rng);
-    return Direct(l.layer, value * passed);
+    let passed = transmittance(ray, l.distance - (1e-4 + 1e-4 * l.distance), FAINT, false, rng);
+    return Incident(l.wi, light * passed, pdf, l.layer, value * passed);
 }
 
 fn camera_ray(x: u32, y: u32, u: vec4<f32>) -> Ray {
@@ -86,11 +115,13 @@ fn reflectance(m: u32, s: Surface) -> vec3<f32> {
     return sum * s.tint;
 }
 
-// Sample `index` of pixel (x, y). One loop for camera and path: each heavy function is called at one place, because
+// A sample of pixel (x, y); `paths` are the random numbers of its path. One loop for camera and path: each heavy function is called at one place, because
 // shader compilers copy functions to where they are called.
-fn take(x: u32, y: u32, index: u32) -> Taken {
+fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
+    var begun: Begun;
     var out: Taken;
-    var rng = rng_new(x, y, index, frame.seed);
+    var second: Second;
+    var rng = rng_new(x, y, frame.index, frame.seed);
     var ray = camera_ray(x, y, rng_set(&rng, 0u));
     var tmin = 0.0;
     // Straight from the eye: `carry` is the product of the gaps so far, `bounce` counts crossings.
@@ -106,6 +137,10 @@ fn take(x: u32, y: u32, index: u32) -> Taken {
     // The vertex that the path left last, and the density with which it did.
     var v: Vertex;
     var pdf = 0.0;
+    // What the path carries from the second point on, whether other paths may have it, the gaps on the way.
+    var tail = vec3<f32>(1.0);
+    var lent = false;
+    var passed = 1.0;
     loop {
         let hit = nearest(ray, tmin, FAR);
         let miss = hit.place == EMPTY;
@@ -123,9 +158,10 @@ fn take(x: u32, y: u32, index: u32) -> Taken {
             if (!camera && gap > 0.0) {
                 var pass_on = gap >= 1.0;
                 if (!pass_on) {
-                    pass_on = rng_coin(&rng) < gap;
+                    pass_on = rng_coin(paths) < gap;
                 }
                 if (pass_on) {
+                    passed *= gap;
                     tmin = hit.t * (1.0 + 2e-6) + frame.globals.offset;
                     continue;
                 }
@@ -148,7 +184,11 @@ fn take(x: u32, y: u32, index: u32) -> Taken {
                     }
                 }
             }
-            add_light(&out, layer, given * carry * share);
+            if (lent) {
+                add_beyond(&second, layer, given * tail * share);
+            } else {
+                add_light(&out, layer, given * carry * share);
+            }
         }
         var scatter = false;
         if (miss) {
@@ -170,13 +210,29 @@ fn take(x: u32, y: u32, index: u32) -> Taken {
             if (lit_here) {
                 let at = place_of(s.material, s, ray.d);
                 let wo = local(s, -ray.d);
-                let u = rng_set(&rng, select(BOUNCES + 2u * bounce + 1u, 1u + bounce, camera));
-                if (!camera) {
+                // The camera and the path draw from numbers of their own.
+                var lit: Incident;
+                if (camera) {
+                    lit = incident(s.material, s, at, wo, rng_set(&rng, 1u + bounce), &rng);
+                } else {
+                    lit = incident(s.material, s, at, wo, rng_set(paths, 2u * bounce + 1u), paths);
                     // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
-                    carry *= 1.0 / max(1.0 - gap, 1e-6);
+                    let yarn = 1.0 / max(1.0 - gap, 1e-6);
+                    carry *= yarn;
+                    tail *= yarn;
                 }
-                let lit = direct(s.material, s, at, wo, u, &rng);
-                add_light(&out, lit.layer, lit.value * carry);
+                if (!camera && bounce == 1u) {
+                    begun.has_second = true;
+                    second.s = s;
+                    second.passed = passed;
+                    second.lit = lit;
+                    second.wi = ray.d;
+                    lent = !shares(s.material);
+                } else if (lent) {
+                    add_beyond(&second, lit.layer, lit.value * tail);
+                } else {
+                    add_light(&out, lit.layer, lit.value * carry);
+                }
                 if (camera) {
                     // Reservoir of one: each crossing is kept in proportion to its weight.
                     all_weights += weight;
@@ -196,19 +252,19 @@ fn take(x: u32, y: u32, index: u32) -> Taken {
             }
         }
         if (camera) {
-            var passed = select(carry.x * gap, 0.0, miss);
-            if (passed > 0.0) {
-                out.gap = passed;
-                if (passed < FAINT) {
+            var left = select(carry.x * gap, 0.0, miss);
+            if (left > 0.0) {
+                out.gap = left;
+                if (left < FAINT) {
                     if (rng_coin(&rng) < 0.5) {
                         out.gap = 0.0;
-                        passed = 0.0;
+                        left = 0.0;
                     }
-                    passed *= 2.0;
+                    left *= 2.0;
                 }
                 bounce += 1u;
-                if (passed > 0.0 && bounce < CROSSINGS) {
-                    carry = vec3<f32>(passed);
+                if (left > 0.0 && bounce < CROSSINGS) {
+                    carry = vec3<f32>(left);
                     tmin = hit.t * (1.0 + 2e-6) + frame.globals.offset;
                     continue;
                 }
@@ -218,7 +274,10 @@ fn take(x: u32, y: u32, index: u32) -> Taken {
             bounce = 0u;
             v = chosen;
             carry = chosen.throughput * (all_weights / chosen_weight);
+            v.throughput = carry;
             scatter = found;
+            begun.has_first = found;
+            begun.first = v;
         }
         if (!scatter) {
             break;
@@ -229,7 +288,7 @@ fn take(x: u32, y: u32, index: u32) -> Taken {
         if (bounce > frame.depth || (bounce == frame.depth && !shares(m) && frame.globals.soft_lights == 0u)) {
             break;
         }
-        let u = rng_set(&rng, BOUNCES + 2u * bounce);
+        let u = rng_set(paths, 2u * bounce);
         let b = scattering(m, v.s, v.wo, vec3<f32>(0.0), true, u.xyz);
         pdf = b.pdf;
         if (pdf <= 1e-12) {
@@ -240,17 +299,28 @@ fn take(x: u32, y: u32, index: u32) -> Taken {
         if (q <= 0.0) {
             break;
         }
+        var kept = 1.0;
         if (bounce > 1u && q < 1.0) {
             if (u.w >= q) {
                 break;
             }
-            carry *= 1.0 / q;
+            kept = 1.0 / q;
+            carry *= kept;
         }
         let d = world(v.s, b.wi);
+        let away = abs(b.wi.z) / pdf * kept;
+        if (bounce == 2u) {
+            second.wi = d;
+            tail = vec3<f32>(away);
+        } else {
+            tail *= b.f * away;
+        }
         ray = ray_new(leave(v.s, d), d);
         tmin = 0.0;
     }
-    return out;
+    begun.taken = out;
+    begun.second = second;
+    return begun;
 }
 
 fn add_discs(out: ptr<function, Taken>, d: vec3<f32>, passed: f32) {
@@ -259,37 +329,4 @@ fn add_discs(out: ptr<function, Taken>, d: vec3<f32>, passed: f32) {
             add_light(out, lights[i].layer, lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
         }
     }
-}
-
-fn finite(v: vec3<f32>) -> bool {
-    return all(abs(v) < vec3<f32>(1e30));
-}
-
-@compute @workgroup_size(8, 8, 1)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) inner: vec3<u32>) {
-    let block = frame.block + group.x;
-    let columns = (frame.width + 7u) / 8u;
-    let x = (block % columns) * 8u + inner.x;
-    let y = (block / columns) * 8u + inner.y;
-    if (x >= frame.width || y >= frame.height) {
-        return;
-    }
-    let pixel = y * frame.width + x;
-    var sum = sums[pixel];
-    for (var index = frame.first; index < frame.first + frame.count; index++) {
-        let s = take(x, y, index);
-        var all = vec3<f32>(0.0);
-        for (var k = 0u; k < LAYERS; k++) {
-            let l = select(vec3<f32>(0.0), s.light[k], finite(s.light[k]));
-            all += l;
-            sum.light[k] += vec4<f32>(l, 0.0);
-        }
-        let lum = luminance(all);
-        sum.light[0].w += lum * lum;
-        sum.light[1].w += s.gap;
-        sum.light[2].w += s.depth;
-        sum.albedo += vec4<f32>(s.albedo, 0.0);
-        sum.normal += vec4<f32>(s.normal, 0.0);
-    }
-    sums[pixel] = sum;
 }

@@ -109,11 +109,11 @@ struct Frame {
     depth: u32,
     lens_y: vec3<f32>,
     seed: u32,
-    // First sample and how many, first block of 8 x 8 pixels and how many.
-    first: u32,
-    count: u32,
+    // Number of the sample, how far the blocks of 8 x 8 pixels are shifted for it, and the first of them.
+    index: u32,
+    left: u32,
+    above: u32,
     block: u32,
-    blocks: u32,
     globals: Globals,
 }
 

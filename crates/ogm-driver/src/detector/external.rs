@@ -1,23 +1,14 @@
-//! Any camera as a detector: a command of the lab's own that answers JSON lines, so that no camera library is needed here.
-//!
-//! | line to its standard input | line from its standard output |
-//! |---|---|
-//! | `{"ask":"identify"}` | `{"name":"camera and serial number"}` |
-//! | `{"ask":"lamp"}` | `{"seconds":7200}`, or `{"seconds":null}` when it cannot know |
-//! | `{"ask":"expose","tag":7,"ms":16.0,"f_number":4.0}` | `{"tag":7,"counts":1234.5,"reference":0.0,"saturated":false}` |
-//!
-//! Counts are linear, raw, dark level included. `{"error":"..."}` ends the scan with that text. What it says on standard error goes to the terminal.
+//! Any camera as a detector: a command of the lab's own that answers the JSON lines of [`crate::protocol::camera`], so that no camera library is
+//! needed here. What it says on standard error goes to the terminal.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-use serde::Deserialize;
-use serde_json::json;
-
-use crate::detector::{Detector, Shot};
+use super::{Detector, Exposure, Shot};
 use crate::error::{Error, Result};
+use crate::protocol::camera::{self, Answer, Question};
 use crate::rig::Rig;
 use crate::transport::{Link, SLICE};
 
@@ -30,30 +21,6 @@ pub struct ExternalDetector {
     child: Child,
     stdin: ChildStdin,
     lines: Receiver<String>,
-}
-
-#[derive(Deserialize)]
-struct Identity {
-    name: String,
-}
-
-#[derive(Deserialize)]
-struct Lamp {
-    seconds: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct Exposed {
-    tag: u64,
-    counts: f64,
-    #[serde(default)]
-    reference: f64,
-    saturated: bool,
-}
-
-#[derive(Deserialize)]
-struct Trouble {
-    error: String,
 }
 
 impl ExternalDetector {
@@ -115,15 +82,16 @@ impl ExternalDetector {
         ))
     }
 
-    /// Asks once and waits for the first line that `read` takes; the arms are stopped at once when asked to meanwhile.
+    /// Asks once and waits for the first answer that `pick` takes; the arms are stopped at once when asked to meanwhile.
     fn ask<T>(
         &mut self,
         link: &mut Link,
-        question: &serde_json::Value,
+        question: Question,
         deadline: Duration,
-        read: impl Fn(&str) -> Option<T>,
+        pick: impl Fn(Answer) -> Option<T>,
     ) -> Result<T> {
         while self.lines.try_recv().is_ok() {} // late answers to earlier questions
+        let question = camera::encode(&question);
         if writeln!(self.stdin, "{question}")
             .and_then(|()| self.stdin.flush())
             .is_err()
@@ -135,25 +103,24 @@ impl ExternalDetector {
         loop {
             link.check_stop()?;
             match self.lines.recv_timeout(SLICE) {
-                Ok(line) => {
-                    if let Ok(t) = serde_json::from_str::<Trouble>(&line) {
-                        return Err(self.trouble(&format!("reports: {}", t.error)));
+                Ok(line) => match camera::parse_answer(&line) {
+                    Some(Answer::Trouble { error }) => {
+                        return Err(self.trouble(&format!("reports: {error}")));
                     }
-                    if let Some(value) = read(&line) {
-                        return Ok(value);
-                    }
-                    strange = Some(line);
-                }
+                    answer => match answer.and_then(&pick) {
+                        Some(value) => return Ok(value),
+                        None => strange = Some(line),
+                    },
+                },
                 Err(RecvTimeoutError::Timeout) if Instant::now() < end => {}
                 Err(RecvTimeoutError::Timeout) => {
-                    let what = match strange {
+                    return Err(self.trouble(&match strange {
                         Some(line) => format!("answered {question} with {line:?}"),
                         None => format!(
                             "gave no answer within {} s to {question}",
                             deadline.as_secs_f64()
                         ),
-                    };
-                    return Err(self.trouble(&what));
+                    }));
                 }
                 Err(RecvTimeoutError::Disconnected) => return Err(self.trouble("has ended")),
             }
@@ -168,46 +135,38 @@ impl Drop for ExternalDetector {
     }
 }
 
+/// A camera may need this long to wake up.
+const WAKING: Duration = Duration::from_secs(30);
+/// A camera reads out: this long beyond the exposure.
+const READING_OUT: Duration = Duration::from_secs(2);
+
 impl Detector for ExternalDetector {
     fn identify(&mut self, link: &mut Link, _rig: &Rig) -> Result<String> {
-        // A camera may need its time to wake up.
-        self.ask(
-            link,
-            &json!({"ask": "identify"}),
-            Duration::from_secs(30),
-            |line| serde_json::from_str::<Identity>(line).ok().map(|i| i.name),
-        )
-    }
-
-    fn lamp_seconds(&mut self, link: &mut Link, rig: &Rig) -> Result<Option<f64>> {
-        self.ask(link, &json!({"ask": "lamp"}), rig.reply(), |line| {
-            let lamp = serde_json::from_str::<Lamp>(line).ok()?;
-            lamp.seconds
-                .is_none_or(f64::is_finite)
-                .then_some(lamp.seconds)
+        self.ask(link, Question::Identify, WAKING, |a| match a {
+            Answer::Identity { name } => Some(name),
+            _ => None,
         })
     }
 
-    fn expose(
-        &mut self,
-        link: &mut Link,
-        rig: &Rig,
-        tag: u64,
-        exposure_ms: f64,
-        f_number: f64,
-    ) -> Result<Shot> {
-        let question =
-            json!({"ask": "expose", "tag": tag, "ms": exposure_ms, "f_number": f_number});
-        // Cameras read out: two seconds beyond the exposure.
-        let deadline = rig.reply() + Duration::from_secs_f64(exposure_ms / 1000.0 * 1.1 + 2.0);
-        self.ask(link, &question, deadline, |line| {
-            let e = serde_json::from_str::<Exposed>(line).ok()?;
-            (e.tag == tag && e.counts.is_finite() && e.reference.is_finite()).then_some(Shot {
-                exposure_ms,
-                counts: e.counts,
-                reference: e.reference,
-                saturated: e.saturated,
-            })
+    fn lamp_seconds(&mut self, link: &mut Link, rig: &Rig) -> Result<Option<f64>> {
+        self.ask(link, Question::Lamp, rig.reply(), |a| match a {
+            Answer::Lamp { seconds } => Some(seconds),
+            _ => None,
+        })
+    }
+
+    fn expose(&mut self, link: &mut Link, rig: &Rig, exposure: &Exposure) -> Result<Shot> {
+        let Exposure { tag, ms, f_number } = *exposure;
+        let question = Question::Expose { tag, ms, f_number };
+        let deadline = exposure.deadline(rig) + READING_OUT;
+        self.ask(link, question, deadline, |a| match a {
+            Answer::Exposed {
+                tag: t,
+                counts,
+                reference,
+                saturated,
+            } if t == tag => Some(exposure.shot(counts, reference, saturated)),
+            _ => None,
         })
     }
 }
@@ -237,6 +196,14 @@ mod tests {
         )
     }
 
+    fn exposure(tag: u64, ms: f64) -> Exposure {
+        Exposure {
+            tag,
+            ms,
+            f_number: 4.0,
+        }
+    }
+
     /// A camera in eight lines of shell.
     const CAMERA: &str = r#"while read line; do case "$line" in
         *identify*) echo noise; echo '{"name":"shell camera 1"}';;
@@ -251,7 +218,7 @@ mod tests {
         let mut d = ExternalDetector::start(CAMERA).unwrap();
         assert_eq!(d.identify(&mut link, &rig).unwrap(), "shell camera 1");
         assert_eq!(d.lamp_seconds(&mut link, &rig).unwrap(), None);
-        let shot = d.expose(&mut link, &rig, 7, 16.0, 4.0).unwrap();
+        let shot = d.expose(&mut link, &rig, &exposure(7, 16.0)).unwrap();
         assert_eq!(
             shot,
             Shot {
@@ -300,7 +267,7 @@ mod tests {
             token.stop();
         });
         assert!(matches!(
-            d.expose(&mut link, &rig, 1, 60_000.0, 4.0),
+            d.expose(&mut link, &rig, &exposure(1, 60_000.0)),
             Err(Error::Stopped)
         ));
     }

@@ -5,14 +5,12 @@
 #[path = "../tests/nist/mod.rs"]
 mod nist;
 
+use std::hint::black_box;
 use std::time::Instant;
 use woven_fit::solve::{Settings, solve};
-use woven_fit::uncertainty::uncertainty;
 
 fn main() {
     let csv = std::env::args().any(|a| a == "--csv");
-    let settings = Settings::default();
-    let all = nist::all();
     if csv {
         println!("problem,start,digits,error_digits,rss_digits,evaluations,microseconds");
     } else {
@@ -21,65 +19,32 @@ fn main() {
             "problem", "start", "parameters", "errors", "RSS", "evaluations", "µs"
         );
     }
-    let (mut sum, mut solved, mut six, mut errors, mut total) = (0.0, 0, 0, 0, 0.0);
-    for data in &all {
+    let (mut tally, mut total) = (nist::Tally::default(), 0.0);
+    for data in &nist::all() {
         for (i, start) in data.starts.iter().enumerate() {
+            let score = nist::run(data, i);
+            tally.add(data, &score);
             // The least of seven: what the work costs, not what else the machine does.
-            let mut time = f64::INFINITY;
-            let mut solution = None;
-            for _ in 0..7 {
+            let time = (0..7).fold(f64::INFINITY, |least, _| {
                 let clock = Instant::now();
-                let s = nist::with_problem(data, |p| solve(p, start, &settings));
-                time = time.min(clock.elapsed().as_secs_f64());
-                solution = Some(s);
-            }
-            let s = solution.expect("seven rounds");
-            let digits = nist::digits(&s.x, &data.certified);
-            let names = vec!["b"; s.x.len()];
-            let u = uncertainty(
-                &s.jacobian,
-                data.y.len(),
-                &names,
-                &s.x,
-                &s.at_bound,
-                s.sse,
-                true,
-            );
-            let found: Vec<f64> = u
-                .standard_error
-                .iter()
-                .map(|e| e.unwrap_or(f64::NAN))
-                .collect();
-            let error_digits = nist::digits(&found, &data.deviations);
-            let rss = nist::digits(&[s.sse], &[data.rss]);
-            let micros = time * 1e6;
+                black_box(nist::with_problem(data, |p| {
+                    solve(p, start, &Settings::default())
+                }));
+                least.min(clock.elapsed().as_secs_f64())
+            });
+            total += time;
+            let (name, s, n, micros) = (data.name, i + 1, score.solution.evaluations, time * 1e6);
+            let (digits, errors, rss) = (score.digits, score.error_digits, score.rss_digits);
             if csv {
-                println!(
-                    "{},{},{digits:.2},{error_digits:.2},{rss:.2},{},{micros:.1}",
-                    data.name,
-                    i + 1,
-                    s.evaluations
-                );
+                println!("{name},{s},{digits:.2},{errors:.2},{rss:.2},{n},{micros:.1}");
             } else {
                 println!(
-                    "{:9} {:>5} {digits:>10.1} {error_digits:>7.1} {rss:>6.1} {:>11} {micros:>9.0}",
-                    data.name,
-                    i + 1,
-                    s.evaluations
+                    "{name:9} {s:>5} {digits:>10.1} {errors:>7.1} {rss:>6.1} {n:>11} {micros:>9.0}"
                 );
             }
-            sum += digits;
-            solved += i32::from(digits >= 4.0);
-            six += i32::from(digits >= 6.0);
-            errors += i32::from(error_digits >= 6.0 && data.name != "Lanczos1");
-            total += time;
         }
     }
     if !csv {
-        println!(
-            "\n54 runs: {solved} solved, {six} with 6 digits or more, mean {:.2} digits, standard errors with 6 digits or more {errors} of 52 (without Lanczos1), {:.1} ms together",
-            sum / 54.0,
-            total * 1e3
-        );
+        println!("\n{}, {:.1} ms together", tally.text(), total * 1e3);
     }
 }

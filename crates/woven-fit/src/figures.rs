@@ -146,6 +146,41 @@ pub fn residual_chart(points: &Points, slice: &Slice, models: &[&ModelFit]) -> S
     chart(&title, "outgoing angle θ (°)", "%", &list, Scale::Linear)
 }
 
+/// Every figure of the report with a name for its file.
+pub fn all(result: &FitResult) -> Vec<(String, String)> {
+    let points = &result.transmission_points;
+    let models = shown(result);
+    let mut out = Vec::new();
+    let planes = [(0.0, "weft"), (PI / 2.0, "warp")];
+    for theta in [0.0, 40.0] {
+        if theta > 0.0 && points.incidences.len() == 1 {
+            continue;
+        }
+        for (phi, plane) in planes {
+            out.push((
+                format!("polar-{theta:.0}-{plane}"),
+                polar_plot(result, theta, phi),
+            ));
+        }
+    }
+    for slice in slices(points) {
+        let name = format!("{:.0}-{:.0}", slice.theta_deg, slice.phi_deg);
+        let linear = slice_chart(points, &slice, &models, Scale::Linear);
+        let log = slice_chart(points, &slice, &models, Scale::Log);
+        out.push((format!("slice-{name}"), linear));
+        out.push((format!("slice-{name}-log"), log));
+        out.push((
+            format!("residuals-{name}"),
+            residual_chart(points, &slice, &models),
+        ));
+    }
+    let sheet = |f: &&ModelFit| f.has_gap && f.label == "sheet";
+    if let Some(fit) = result.ranking.iter().find(sheet) {
+        out.push(("gap".to_owned(), gap_chart(points, fit)));
+    }
+    out
+}
+
 /// Measured and fitted scattering of one incidence in one plane, transmitted below and reflected above the sheet.
 ///
 /// `theta_deg` picks the nearest incidence in the weft plane (`phi` = 0) or another plane of azimuth `phi` radians.

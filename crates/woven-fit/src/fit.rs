@@ -3,8 +3,10 @@
 use crate::measurement::{Detail, Measurement, Points};
 use crate::problem::{Metric, Spec};
 use crate::rank;
+use crate::reflection::reflected;
 use crate::robust::Loss;
 use crate::search::fit_spec;
+use crate::straight::{Straight, straight};
 use crate::uncertainty::Uncertainty;
 use anyhow::{Result, bail};
 use rayon::prelude::*;
@@ -33,6 +35,8 @@ pub struct Options {
     pub cosine_weights: bool,
     /// Cross-validate over incidences also where that takes long (matrices of thousands of values).
     pub cross_validate: bool,
+    /// Look at profiles of the sum of squares also there.
+    pub profile: bool,
 }
 
 impl Default for Options {
@@ -46,6 +50,7 @@ impl Default for Options {
             loss: Loss::Squares,
             cosine_weights: false,
             cross_validate: false,
+            profile: false,
         }
     }
 }
@@ -57,11 +62,19 @@ pub struct Parameter {
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// Its standard error; none where the data cannot see it.
+    /// Its standard error; none where the data cannot see it or only limit it. Where the covariance misleads, half of the
+    /// 68 % interval of the profile.
     pub standard_error: Option<f64>,
-    /// 95 % interval; none like the standard error. For log-scaled parameters it is symmetric in the logarithm.
+    /// 68.27 % interval, like the next.
+    pub interval68: Option<(f64, f64)>,
+    /// 95 % interval; none where the data cannot see the parameter. Where it ends at a bound it is a limit, and the remark says
+    /// so. For log-scaled parameters that of the covariance is symmetric in the logarithm.
     pub interval95: Option<(f64, f64)>,
-    /// Why there is no error bar, or empty.
+    /// 99.73 % interval, like the others.
+    pub interval997: Option<(f64, f64)>,
+    /// Whether the intervals come from the profile of the sum of squares, because the covariance misleads.
+    pub profiled: bool,
+    /// Why there is no error bar, or what is odd about it; mostly empty.
     pub remark: String,
 }
 
@@ -88,6 +101,8 @@ pub struct ModelFit {
     pub rms_e4: f64,
     /// The same without the straight-through patches.
     pub rms_off_peak_e4: f64,
+    /// Root mean square misfit in the metric that was fitted, not normalised: in the logarithmic one about a relative error.
+    pub rms_metric: f64,
     /// Sum of squares in the metric that was fitted, in units of the best model's scatter, apart for peaks and the rest:
     /// about the number of points for the best model. The table is sorted by it.
     pub misfit: f64,
@@ -163,23 +178,6 @@ pub struct FitResult {
     /// The measured reflection.
     #[serde(skip)]
     pub reflection_points: Points,
-}
-
-/// Straight-through light at the incidence nearest to the normal.
-#[derive(Clone, Debug, Serialize)]
-pub struct Straight {
-    /// Angle of incidence in degrees.
-    pub theta_deg: f64,
-    /// Measured direct-hemispherical transmittance; none for scattered points.
-    pub transmittance: Option<f64>,
-    /// Measured straight-through part.
-    pub measured: f64,
-    /// Measured share of the transmittance.
-    pub measured_share: Option<f64>,
-    /// Openness of the fitted sheet.
-    pub openness: Option<f64>,
-    /// Straight-through patch of the fitted sheet over its transmittance.
-    pub model_share: Option<f64>,
 }
 
 /// Reads a measurement and fits it.
@@ -291,43 +289,20 @@ pub fn fit(data: &Measurement, options: &Options, progress: Progress<'_>) -> Res
         .collect::<Result<_>>()?;
     rank::sort(&mut ranking, &full, options);
 
-    let mut notes = Vec::new();
+    let mut notes = data.remarks();
     let mut reflection = None;
     if let Some(model) = sheet.filter(|_| with_reflection)
         && let Some(best) = ranking.iter().find(|f| f.label == "sheet")
     {
-        let mut spec = Spec::reflection(model, &best.values);
         let coarse = data.points(false, Detail::Coarse, options.normal_only);
-        let mut fit = fit_spec(&spec, &coarse, &reflection_points, options)?;
-        // The yarn cannot give more light than it gets: what the lobe would take beyond that is withheld from it, and
-        // the even part is fitted again.
-        let sum = |fit: &ModelFit| model.split(&fit.values).0.iter().sum::<f64>();
-        let k_r = model
-            .params
-            .iter()
-            .position(|p| p.name == "k_r")
-            .unwrap_or(0);
-        let wanted = sum(&fit);
-        for _ in 0..6 {
-            let excess = sum(&fit) - 1.0;
-            if excess <= 1e-4 {
-                break;
-            }
-            let held = (fit.values[k_r] - excess).max(0.0);
-            spec.hold("k_r", held);
-            let options = Options {
-                starts: 2,
-                ..options.clone()
-            };
-            fit = fit_spec(&spec, &coarse, &reflection_points, &options)?;
-        }
-        if wanted > 1.0 + 1e-4 {
-            notes.push(format!(
-                "Fitted freely, the factors of the sheet sum to {wanted:.3}, more than the light it gets; k_r was held at {} so that they sum to 1.",
-                crate::text::number(fit.values[k_r])
-            ));
-        }
-        fit.place = 1;
+        let fit = reflected(
+            model,
+            best,
+            &coarse,
+            &reflection_points,
+            options,
+            &mut notes,
+        )?;
         reflection = Some(fit);
         progress(total, total, "reflection");
     }
@@ -341,6 +316,7 @@ pub fn fit(data: &Measurement, options: &Options, progress: Progress<'_>) -> Res
         notes.push("The data hold no straight-through light of their own, so no gap was fitted; openness comes from the weave, if known.".to_owned());
     }
     let straight = straight(data, &ranking, &full);
+    notes.extend(straight.as_ref().and_then(Straight::remark));
     Ok(FitResult {
         name: data.name.clone(),
         maker: data.maker.clone(),
@@ -355,44 +331,5 @@ pub fn fit(data: &Measurement, options: &Options, progress: Progress<'_>) -> Res
         notes,
         transmission_points: full,
         reflection_points,
-    })
-}
-
-fn straight(data: &Measurement, ranking: &[ModelFit], points: &Points) -> Option<Straight> {
-    let index = (0..points.points.len())
-        .filter(|&i| points.points[i].is_peak())
-        .max_by(|&a, &b| {
-            points.points[a]
-                .l
-                .z
-                .abs()
-                .total_cmp(&points.points[b].l.z.abs())
-        })?;
-    let peak = points.points[index];
-    let measured = peak.f / peak.gap_density;
-    let whole = |value: &dyn Fn(usize) -> f64| {
-        let rows =
-            (0..points.points.len()).filter(|&i| points.points[i].incidence == peak.incidence);
-        rows.map(|i| value(i) * points.points[i].area).sum::<f64>()
-    };
-    let is_klems = matches!(data.source, crate::measurement::Source::Klems(_));
-    let transmittance = is_klems.then(|| whole(&|i| points.points[i].f));
-    let sheet = ranking.iter().find(|f| f.model == "sheet" && f.has_gap);
-    let openness = sheet.map(|f| {
-        let (_, s) = woven_bsdf::model::find("sheet")
-            .expect("in the list")
-            .split(&f.values);
-        woven_bsdf::sheet::Sheet::gap(&s, peak.l)
-    });
-    let model_share = sheet
-        .filter(|_| is_klems)
-        .map(|f| f.fitted[index] / peak.gap_density / whole(&|i| f.fitted[i]));
-    Some(Straight {
-        theta_deg: woven_bsdf::angles::degrees(peak.l.z.abs().min(1.0).acos()),
-        transmittance,
-        measured,
-        measured_share: transmittance.map(|t| measured / t),
-        openness,
-        model_share,
     })
 }

@@ -62,26 +62,48 @@ pub struct Info {
     pub direct: Vec<(f64, f64, f64)>,
 }
 
-/// Peak, skirt and floor at the incident patch `i`: the floor's level is the median over the patches.
+impl Parts {
+    /// Their sum: the transmittance.
+    pub fn total(&self) -> f64 {
+        self.peak + self.skirt + self.floor
+    }
+}
+
+/// Peak, skirt and floor of one incidence from the values (1/sr) of all patches and their projected solid angles (sr);
+/// `straight` is the straight-through one. The floor's level is the median over the patches.
+pub fn parts_of(values: &[f64], areas: &[f64], straight: usize) -> Parts {
+    let n = values.len();
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let level = if n % 2 == 1 {
+        sorted[n / 2]
+    } else {
+        0.5 * (sorted[n / 2 - 1] + sorted[n / 2])
+    };
+    let sum = |value: &dyn Fn(f64) -> f64| {
+        let rows = values.iter().zip(areas).enumerate();
+        rows.filter(|(i, _)| *i != straight)
+            .map(|(_, (v, a))| value(*v) * a)
+            .sum::<f64>()
+    };
+    let skirt = sum(&|v| (v - level).max(0.0));
+    Parts {
+        peak: values[straight] * areas[straight],
+        skirt,
+        floor: sum(&|v| v) - skirt,
+    }
+}
+
+/// [`parts_of`] the incident patch `i` of a block.
 pub fn parts(k: &Klems, block: &Block, i: usize) -> Parts {
     let n = k.patches.len();
-    let peak = k.straight(block, i);
-    let mut values: Vec<f64> = (0..n).map(|o| k.value(block, o, i)).collect();
-    values.sort_by(f64::total_cmp);
-    let level = if n % 2 == 1 {
-        values[n / 2]
-    } else {
-        0.5 * (values[n / 2 - 1] + values[n / 2])
-    };
-    let skirt = (0..n)
-        .filter(|&o| o != i)
-        .map(|o| (k.value(block, o, i) - level).max(0.0) * k.patches[o].projected_solid_angle())
-        .sum::<f64>();
-    Parts {
-        peak,
-        skirt,
-        floor: k.directional(block, i) - peak - skirt,
-    }
+    let values: Vec<f64> = (0..n).map(|o| k.value(block, o, i)).collect();
+    let areas: Vec<f64> = k
+        .patches
+        .iter()
+        .map(woven_bsdf::measured::klems::Patch::projected_solid_angle)
+        .collect();
+    parts_of(&values, &areas, i)
 }
 
 /// Looks at a measurement.
@@ -159,7 +181,7 @@ impl Info {
         for b in &self.blocks {
             writeln!(s, "\n{}: {:.5} under even light", b.kind, b.hemispherical).expect(ok);
             if let Some(p) = b.normal {
-                let total = p.peak + p.skirt + p.floor;
+                let total = p.total();
                 let share = |x: f64| 100.0 * x / total.max(f64::MIN_POSITIVE);
                 writeln!(
                     s,

@@ -22,25 +22,36 @@
 //! ```
 //!
 //! From a file it is [`fit::fit_measurement`]; [`fit::FitResult::fabric`] gives the fabric file, [`report::html`] the
-//! report, [`figures`] its plots as SVG text. Any other least-squares problem goes to [`solve::solve`].
+//! report, [`figures`] its plots as SVG text, [`compare`] one table of many files. Any other least-squares problem goes to
+//! [`solve::solve`], its error bars to [`uncertainty`] and, where those mislead, to [`profile`]. Without a goniometer
+//! [`photos`] gives first values.
 //!
-//! What is absent: no formula of optics (they are woven-bsdf's), no derivative by hand, no picture but SVG.
+//! What is absent: no formula of optics (they are woven-bsdf's), no derivative by hand, no picture written but SVG.
 
+pub mod compare;
 pub mod convert;
+pub mod directions;
 pub mod figures;
+mod finish;
 pub mod fit;
+mod gap;
 pub mod identify;
 pub mod info;
 pub mod linalg;
 pub mod measurement;
+pub mod photos;
 pub mod plot;
 pub mod problem;
+pub mod profile;
+pub mod quantile;
 pub mod rank;
+mod reflection;
 pub mod report;
 pub mod robust;
 pub mod search;
 pub mod solve;
 pub mod starts;
+pub mod straight;
 mod summary;
 pub mod synth;
 pub mod text;

@@ -45,6 +45,7 @@ pub fn score(fit: &mut ModelFit, points: &Points, metric: Metric, floor: f64) {
     }
     let k = fit.uncertainty.rank as f64 + groups;
     let m = fit.points as f64;
+    fit.rms_metric = (squares.iter().sum::<f64>() / m.max(1.0)).sqrt();
     let correction = if m > k + 1.0 {
         2.0 * k * (k + 1.0) / (m - k - 1.0)
     } else {

@@ -174,7 +174,7 @@ pub fn html(result: &FitResult, command: &str) -> String {
     writeln!(
         s,
         "<h2>How to read this</h2><p>Fits minimise the sum of squares in the {} metric by Levenberg–Marquardt with exact derivatives, linear factors separated and not negative, \
-         from evenly spread starts (seed {}). Where a gap is fitted, straight-through patches and the rest have their own scatter. Error bars are standard errors from the covariance at the minimum; they hold the \
+         from evenly spread starts (seed {}). Where a gap is fitted, straight-through patches and the rest have their own scatter. Error bars are standard errors from the covariance at the minimum, or, where that misleads, from the profile of the sum of squares; they hold the \
          model to be true and the points' errors to be independent, so between files of one cloth expect more. SSE and RMS are of values divided by the peak, times 10⁴. \
          A place is shared where AICc differs by less than 2 or a bootstrap over incidences does not settle the order.</p></html>",
         result.metric.name(),
@@ -190,7 +190,7 @@ fn straight(s: &mut String, result: &FitResult) {
     writeln!(
         s,
         "<h2>Straight-through light</h2><p class='big'>{}</p>",
-        escape(&text::straight(result))
+        escape(&text::straight(result)).replace('\n', "<br>")
     )
     .expect(ok);
     if let Some(share) = st.measured_share {
@@ -244,7 +244,7 @@ fn parameters(s: &mut String, fit: &ModelFit, open: bool) {
     let ok = "a string grows";
     writeln!(
         s,
-        "<details{}><summary><b>{}</b>: {}, rank {} of {}, {} of {} starts agree, {} evaluations</summary><div class='row'><div><table><tr><th class='l'>parameter<th>value ± standard error<th>95 % interval<th class='l'></tr>",
+        "<details{}><summary><b>{}</b>: {}, rank {} of {}, {} of {} starts agree, {} evaluations</summary><div class='row'><div><table><tr><th class='l'>parameter<th>value ± standard error<th>68 %<th>95 %<th>99.7 %<th class='l'></tr>",
         if open { " open" } else { "" },
         escape(&fit.label),
         fit.outcome,
@@ -256,15 +256,25 @@ fn parameters(s: &mut String, fit: &ModelFit, open: bool) {
     )
     .expect(ok);
     for p in &fit.parameters {
-        let interval = p.interval95.map_or(String::new(), |(lo, hi)| {
-            format!("{} … {}", text::number(lo), text::number(hi))
-        });
+        let interval = |i: Option<(f64, f64)>| {
+            i.map_or(String::new(), |(lo, hi)| {
+                format!("{} … {}", text::number(lo), text::number(hi))
+            })
+        };
+        let remarks = [
+            p.remark.as_str(),
+            if p.profiled { "by profile" } else { "" },
+        ];
+        let remarks: Vec<&str> = remarks.into_iter().filter(|r| !r.is_empty()).collect();
         writeln!(
             s,
-            "<tr><td class='l'>{}<td>{}<td>{interval}<td class='l'>{}</tr>",
+            "<tr><td class='l'>{}<td>{}<td>{}<td>{}<td>{}<td class='l'>{}</tr>",
             p.name,
             escape(&text::with_error(p)),
-            escape(&p.remark)
+            interval(p.interval68),
+            interval(p.interval95),
+            interval(p.interval997),
+            escape(&remarks.join("; "))
         )
         .expect(ok);
     }

@@ -1,35 +1,15 @@
 //! From a solver's answer to what a table shows: natural units, error bars, intervals, remarks, scores.
 
+use crate::finish::Finished;
 use crate::fit::{ModelFit, Options, Parameter};
 use crate::measurement::Points;
 use crate::problem::{Evaluator, Spec};
+use crate::profile::{End, LEVELS, Range};
+use crate::quantile::student;
 use crate::rank;
 use crate::solve::Outcome;
-use crate::uncertainty::{student, uncertainty};
-
-/// The end of a fit in the solver's coordinates.
-pub(crate) struct Finished {
-    /// Linear factors.
-    pub(crate) k: Vec<f64>,
-    /// Solver coordinates of the shape.
-    pub(crate) x: Vec<f64>,
-    /// Jacobian of the weighted residuals over factors and shape.
-    pub(crate) jacobian: Vec<f64>,
-    /// Weighted sum of squares.
-    pub(crate) sse: f64,
-    /// Which parameters stand at their bounds.
-    pub(crate) at_bound: Vec<bool>,
-    /// How the solver ended.
-    pub(crate) outcome: Outcome,
-    /// Evaluations spent.
-    pub(crate) evaluations: usize,
-    /// Starts that reached the best minimum.
-    pub(crate) agreeing: usize,
-    /// Starts.
-    pub(crate) starts: usize,
-    /// Root mean square × 10⁴ over incidences left out.
-    pub(crate) cross_validation_e4: Option<f64>,
-}
+use crate::text::number;
+use crate::uncertainty::uncertainty;
 
 /// Puts a finished fit into words and numbers.
 pub(crate) fn summary(
@@ -62,35 +42,37 @@ pub(crate) fn summary(
         }
     }
     let u = uncertainty(&jac, m, &names, &natural, &best.at_bound, best.sse, true);
-    let t95 = student(0.95, u.dof);
-    let parameters = names
-        .iter()
-        .enumerate()
-        .map(|(j, &name)| {
-            let (value, se) = (natural[j], u.standard_error[j]);
+    let quantiles = LEVELS.map(|level| student(level, u.dof));
+    let parameters = (0..names.len())
+        .map(|j| {
             let log = j >= n_linear && spec.coordinates[j - n_linear].log;
-            let interval95 = se.map(|se| {
-                if log {
-                    let half = (t95 * se / value).min(50.0);
-                    (value * (-half).exp(), value * half.exp())
-                } else {
-                    (value - t95 * se, value + t95 * se)
-                }
-            });
-            let remark = if best.at_bound[j] {
-                "stands at its bound".to_owned()
-            } else if se.is_none() {
-                "the data cannot see it alone".to_owned()
-            } else {
-                String::new()
+            let mut p = Parameter {
+                name: names[j],
+                value: natural[j],
+                standard_error: None,
+                interval68: None,
+                interval95: None,
+                interval997: None,
+                profiled: false,
+                remark: String::new(),
             };
-            Parameter {
-                name,
-                value,
-                standard_error: se,
-                interval95,
-                remark,
+            match (best.ranges[j], u.standard_error[j]) {
+                (Some(range), _) => profiled(&mut p, &range, log),
+                (None, Some(se)) => normal(&mut p, se, &quantiles, log),
+                (None, None) if !best.at_bound[j] => {
+                    p.remark = "the data cannot see it alone".to_owned();
+                }
+                (None, None) => {}
             }
+            if best.at_bound[j] {
+                p.remark = ["stands at its bound", &p.remark]
+                    .iter()
+                    .filter(|s| !s.is_empty())
+                    .copied()
+                    .collect::<Vec<_>>()
+                    .join("; ");
+            }
+            p
         })
         .collect();
     let fitted = Evaluator { spec, points: full }.model(&best.k, &best.x);
@@ -114,6 +96,7 @@ pub(crate) fn summary(
         sse_e4: 0.0,
         rms_e4: 0.0,
         rms_off_peak_e4: 0.0,
+        rms_metric: 0.0,
         misfit: 0.0,
         aicc: 0.0,
         bic: 0.0,
@@ -121,7 +104,7 @@ pub(crate) fn summary(
         outcome,
         evaluations: best.evaluations,
         starts_agreeing: best.agreeing,
-        starts: best.starts,
+        starts: options.starts.max(1),
         place: 0,
         stability: 1.0,
         uncertainty: u,
@@ -132,4 +115,46 @@ pub(crate) fn summary(
     };
     rank::score(&mut fit, full, options.metric, floor);
     fit
+}
+
+/// Intervals from the covariance.
+fn normal(p: &mut Parameter, se: f64, quantiles: &[f64; 3], log: bool) {
+    let interval = |t: f64| {
+        if log {
+            let half = (t * se / p.value).min(50.0);
+            (p.value * (-half).exp(), p.value * half.exp())
+        } else {
+            (p.value - t * se, p.value + t * se)
+        }
+    };
+    let [i68, i95, i997] = quantiles.map(interval);
+    p.standard_error = Some(se);
+    (p.interval68, p.interval95, p.interval997) = (Some(i68), Some(i95), Some(i997));
+}
+
+/// Intervals from the profile; none, and no error bar, where the profile ends on neither side.
+fn profiled(p: &mut Parameter, range: &Range, log: bool) {
+    let natural = |x: f64| if log { x.exp() } else { x };
+    let value = |end: End| match end {
+        End::Crossed(x) | End::Bound(x) => natural(x),
+        End::Open => f64::INFINITY,
+    };
+    let crossed = |end: End| matches!(end, End::Crossed(_));
+    let interval =
+        |(lo, hi): (End, End)| (crossed(lo) || crossed(hi)).then(|| (value(lo), value(hi)));
+    let finite = |i: Option<(f64, f64)>| i.filter(|(lo, hi)| lo.is_finite() && hi.is_finite());
+    let [i68, i95, i997] = range.ends.map(interval);
+    (p.interval68, p.interval95, p.interval997) = (finite(i68), finite(i95), finite(i997));
+    p.profiled = true;
+    let (lo, hi) = range.ends[1];
+    p.remark = match (crossed(lo), crossed(hi)) {
+        (true, true) => String::new(),
+        (false, true) => format!("at most {} (95 %)", number(value(hi))),
+        (true, false) => format!("at least {} (95 %)", number(value(lo))),
+        (false, false) => "the data cannot see it alone".to_owned(),
+    };
+    let (lo, hi) = range.ends[0];
+    if crossed(lo) && crossed(hi) && p.interval95.is_some() {
+        p.standard_error = Some(0.5 * (value(hi) - value(lo)));
+    }
 }

@@ -96,7 +96,11 @@ pub fn parameters(fit: &ModelFit) -> String {
     );
     let ok = "a string grows";
     for p in &fit.parameters {
-        writeln!(s, "    {:<11} {}", p.name, with_error(p)).expect(ok);
+        let profile = p.interval95.filter(|_| p.profiled);
+        let interval = profile.map_or(String::new(), |(lo, hi)| {
+            format!(" (95 %: {} … {}, by profile)", number(lo), number(hi))
+        });
+        writeln!(s, "    {:<11} {}{interval}", p.name, with_error(p)).expect(ok);
     }
     if fit.uncertainty.rank < fit.uncertainty.free {
         writeln!(
@@ -145,6 +149,26 @@ pub fn straight(result: &FitResult) -> String {
         if let Some(share) = st.model_share {
             s += &format!(", {:.1} % of its transmittance", 100.0 * share);
         }
+    }
+    if let (Some(m), Some(f)) = (st.measured_parts, st.model_parts) {
+        s += &format!(
+            "\npeak, skirt and floor at {at}: {} + {} + {} measured, {} + {} + {} fitted",
+            number(m.peak),
+            number(m.skirt),
+            number(m.floor),
+            number(f.peak),
+            number(f.skirt),
+            number(f.floor)
+        );
+    }
+    if let (Some(m), Some(f)) = (st.measured_share_all, st.model_share_all)
+        && !result.normal_only
+    {
+        s += &format!(
+            "\nstraight-through share under even light from all sides: {:.1} % measured, {:.1} % fitted",
+            100.0 * m,
+            100.0 * f
+        );
     }
     s
 }

@@ -183,3 +183,91 @@ fn convert_to_csv_and_fit_that() {
             .contains("</html>")
     );
 }
+
+#[test]
+fn many_files_make_one_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut files = Vec::new();
+    for seed in ["0", "1", "2"] {
+        let path = dir.path().join(format!("set{seed}.csv"));
+        let path = path.to_str().unwrap().to_owned();
+        let output = run(&["synth", "paper79", "--seed", seed, "--out", &path]);
+        assert!(output.status.success(), "{output:?}");
+        files.push(path);
+    }
+    let out = dir.path().join("ranked");
+    let mut args = vec![
+        "rank",
+        "--model",
+        "ggx-mirrored,hgf,ward,phong",
+        "--starts",
+        "4",
+    ];
+    args.extend(files.iter().map(String::as_str));
+    args.extend(["--out", out.to_str().unwrap()]);
+    let output = run(&args);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let text = std::fs::read_to_string(out.join("rank.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(
+        json["command"]
+            .as_str()
+            .unwrap()
+            .starts_with("woven-fit rank")
+    );
+    assert_eq!(json["files"].as_array().unwrap().len(), 3);
+    let rows = json["rows"].as_array().unwrap();
+    let label = |i: usize| rows[i]["label"].as_str().unwrap();
+    // The set is made so that the microfacet lobe wins and a bare cosine power loses.
+    assert!(label(0).starts_with("ggx"), "{}", label(0));
+    assert!(
+        label(rows.len() - 1).starts_with("phong"),
+        "{}",
+        label(rows.len() - 1)
+    );
+    assert_eq!(rows[0]["first"], 3);
+    let csv = std::fs::read_to_string(out.join("rank.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 2 + 3 * rows.len());
+}
+
+#[test]
+fn synth_makes_scans_of_models_and_refuses_nonsense() {
+    let output = run(&[
+        "synth",
+        "ward",
+        "--param",
+        "k_s=0.4",
+        "--incidence",
+        "0,30",
+        "--seed",
+        "5",
+    ]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    // Two comments, the header, and 79 angles in two planes at two incidences.
+    assert_eq!(text.lines().count(), 3 + 4 * 79, "{text}");
+    assert!(text.starts_with("# woven-fit synth ward"));
+    refused(&run(&["synth", "velvet"]), &["velvet", "paper79", "ward"]);
+    refused(&run(&["synth", "ward", "--incidence", "95"]), &["95"]);
+}
+
+#[test]
+fn odd_rows_are_named_in_the_notes() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("odd.csv");
+    let output = run(&["synth", "ward", "--out", path.to_str().unwrap()]);
+    assert!(output.status.success(), "{output:?}");
+    let mut text = std::fs::read_to_string(&path).unwrap();
+    let last = text.lines().last().unwrap().to_owned();
+    text += &format!("{last}\n0,0,90,0,0.1,\n");
+    std::fs::write(&path, text).unwrap();
+    let output = run(&["fit", path.to_str().unwrap(), "--model", "lambert"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.contains("row 159 repeats row 158") && text.contains("row 160 left out"),
+        "{text}"
+    );
+}

@@ -6,159 +6,12 @@
     reason = "used in parts by a test and by a bench"
 )]
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
-use woven_fit::solve::Residuals;
+#[path = "../dual/mod.rs"]
+mod dual;
 
-/// A number with N slopes.
-#[derive(Clone, Copy)]
-pub struct Dual<const N: usize> {
-    v: f64,
-    d: [f64; N],
-}
-
-impl<const N: usize> Dual<N> {
-    fn chain(self, v: f64, slope: f64) -> Self {
-        let mut d = self.d;
-        for s in &mut d {
-            *s *= slope;
-        }
-        Self { v, d }
-    }
-}
-
-/// What the models need of a number.
-pub trait Num:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + Add<f64, Output = Self>
-    + Sub<f64, Output = Self>
-    + Mul<f64, Output = Self>
-{
-    fn exp(self) -> Self;
-    fn ln(self) -> Self;
-    fn cos(self) -> Self;
-    fn sin(self) -> Self;
-    fn atan(self) -> Self;
-    fn recip(self) -> Self;
-    fn sqrt(self) -> Self;
-}
-
-impl Num for f64 {
-    fn exp(self) -> Self {
-        f64::exp(self)
-    }
-    fn ln(self) -> Self {
-        f64::ln(self)
-    }
-    fn cos(self) -> Self {
-        f64::cos(self)
-    }
-    fn sin(self) -> Self {
-        f64::sin(self)
-    }
-    fn atan(self) -> Self {
-        f64::atan(self)
-    }
-    fn recip(self) -> Self {
-        f64::recip(self)
-    }
-    fn sqrt(self) -> Self {
-        f64::sqrt(self)
-    }
-}
-
-impl<const N: usize> Num for Dual<N> {
-    fn exp(self) -> Self {
-        let e = self.v.exp();
-        self.chain(e, e)
-    }
-    fn ln(self) -> Self {
-        self.chain(self.v.ln(), 1.0 / self.v)
-    }
-    fn cos(self) -> Self {
-        self.chain(self.v.cos(), -self.v.sin())
-    }
-    fn sin(self) -> Self {
-        self.chain(self.v.sin(), self.v.cos())
-    }
-    fn atan(self) -> Self {
-        self.chain(self.v.atan(), 1.0 / (1.0 + self.v * self.v))
-    }
-    fn recip(self) -> Self {
-        let r = 1.0 / self.v;
-        self.chain(r, -r * r)
-    }
-    fn sqrt(self) -> Self {
-        let r = self.v.sqrt();
-        self.chain(r, 0.5 / r)
-    }
-}
-
-macro_rules! by_slopes {
-    ($op:ident, $f:ident, |$a:ident, $b:ident| $v:expr, $slope:expr) => {
-        impl<const N: usize> $op for Dual<N> {
-            type Output = Self;
-            #[allow(clippy::needless_range_loop, clippy::suspicious_arithmetic_impl)]
-            fn $f(self, $b: Self) -> Self {
-                let $a = self;
-                let mut d = [0.0; N];
-                for k in 0..N {
-                    d[k] = $slope($a.d[k], $b.d[k]);
-                }
-                Self { v: $v, d }
-            }
-        }
-    };
-}
-by_slopes!(Add, add, |a, b| a.v + b.v, |x, y| x + y);
-by_slopes!(Sub, sub, |a, b| a.v - b.v, |x, y| x - y);
-by_slopes!(Mul, mul, |a, b| a.v * b.v, |x, y| x * b.v + a.v * y);
-
-impl<const N: usize> Div for Dual<N> {
-    type Output = Self;
-    fn div(self, b: Self) -> Self {
-        let (v, r) = (self.v / b.v, 1.0 / b.v);
-        let mut d = self.d;
-        for (x, y) in d.iter_mut().zip(b.d) {
-            *x = (*x - v * y) * r;
-        }
-        Self { v, d }
-    }
-}
-impl<const N: usize> Neg for Dual<N> {
-    type Output = Self;
-    fn neg(self) -> Self {
-        self.chain(-self.v, -1.0)
-    }
-}
-impl<const N: usize> Add<f64> for Dual<N> {
-    type Output = Self;
-    fn add(self, b: f64) -> Self {
-        Self {
-            v: self.v + b,
-            ..self
-        }
-    }
-}
-impl<const N: usize> Sub<f64> for Dual<N> {
-    type Output = Self;
-    fn sub(self, b: f64) -> Self {
-        Self {
-            v: self.v - b,
-            ..self
-        }
-    }
-}
-impl<const N: usize> Mul<f64> for Dual<N> {
-    type Output = Self;
-    fn mul(self, b: f64) -> Self {
-        self.chain(self.v * b, b)
-    }
-}
+use dual::{Dual, Num};
+use woven_fit::solve::{Outcome, Residuals, Settings, Solution, solve};
+use woven_fit::uncertainty::uncertainty;
 
 /// One problem as read from its file.
 pub struct Nist {
@@ -227,11 +80,7 @@ where
     fn evaluate(&mut self, b: &[f64], r: &mut [f64], jac: Option<&mut [f64]>) -> bool {
         let m = r.len();
         if let Some(jac) = jac {
-            let b: [Dual<N>; N] = std::array::from_fn(|j| {
-                let mut d = [0.0; N];
-                d[j] = 1.0;
-                Dual { v: b[j], d }
-            });
+            let b: [Dual<N>; N] = std::array::from_fn(|j| Dual::variable(b[j], j));
             for i in 0..m {
                 let f = (self.slopes)(&b, self.data.x[i]);
                 r[i] = f.v - self.data.y[i];
@@ -341,4 +190,78 @@ pub fn digits(found: &[f64], certified: &[f64]) -> f64 {
             }
         })
         .fold(11.0, f64::min)
+}
+
+/// What one run came to.
+pub struct Score {
+    pub solution: Solution,
+    /// Digits of the worst parameter.
+    pub digits: f64,
+    /// Digits of the worst standard error; Lanczos1 has no noise, so its errors are rounding.
+    pub error_digits: f64,
+    /// Digits of the residual sum of squares.
+    pub rss_digits: f64,
+}
+
+/// One run from start 0 or 1 with the solver's default setting.
+pub fn run(data: &Nist, start: usize) -> Score {
+    let solution = with_problem(data, |p| {
+        solve(p, &data.starts[start], &Settings::default())
+    });
+    let names = vec!["b"; solution.x.len()];
+    let u = uncertainty(
+        &solution.jacobian,
+        data.y.len(),
+        &names,
+        &solution.x,
+        &solution.at_bound,
+        solution.sse,
+        true,
+    );
+    let errors: Vec<f64> = u
+        .standard_error
+        .iter()
+        .map(|e| e.unwrap_or(f64::NAN))
+        .collect();
+    Score {
+        digits: digits(&solution.x, &data.certified),
+        error_digits: digits(&errors, &data.deviations),
+        rss_digits: digits(&[solution.sse], &[data.rss]),
+        solution,
+    }
+}
+
+/// Sums over the 54 runs.
+#[derive(Default)]
+pub struct Tally {
+    pub runs: usize,
+    pub converged: usize,
+    pub four: usize,
+    pub six: usize,
+    pub errors_six: usize,
+    pub sum: f64,
+}
+
+impl Tally {
+    pub fn add(&mut self, data: &Nist, score: &Score) {
+        self.runs += 1;
+        self.converged += usize::from(score.solution.outcome == Outcome::Converged);
+        self.four += usize::from(score.digits >= 4.0);
+        self.six += usize::from(score.digits >= 6.0);
+        self.errors_six += usize::from(score.error_digits >= 6.0 && data.name != "Lanczos1");
+        self.sum += score.digits;
+    }
+    pub fn mean(&self) -> f64 {
+        self.sum / self.runs as f64
+    }
+    pub fn text(&self) -> String {
+        format!(
+            "{} runs: {} solved, {} with 6 digits or more, mean {:.2} digits, standard errors with 6 digits or more {} of 52 (without Lanczos1)",
+            self.runs,
+            self.four,
+            self.six,
+            self.mean(),
+            self.errors_six
+        )
+    }
 }

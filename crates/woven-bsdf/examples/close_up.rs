@@ -1,5 +1,5 @@
 //! A close-up of a weave for any renderer: `cargo run -p woven-bsdf --example close_up -- twill out.gltf`, then for
-//! instance `woven-render render out.gltf -o twill.png`. Weaves: plain, twill, satin, leno, lace.
+//! instance `woven-render frame out.gltf -o twill.png`. Weaves: plain, twill, satin, leno, lace.
 //!
 //! The yarns are the tubes of `weave::yarns`, 0.4 mm apart and enlarged a thousandfold (a millimetre is a metre), with
 //! a camera, a lamp above and a bright panel behind; the numbers lie in a file of the same name and the ending `.bin`.

@@ -115,8 +115,8 @@ fn reflectance(m: u32, s: Surface) -> vec3<f32> {
     return sum * s.tint;
 }
 
-// A sample of pixel (x, y); `paths` are the random numbers of its path. One loop for camera and path: each heavy function is called at one place, because
-// shader compilers copy functions to where they are called.
+// A sample of pixel (x, y); `paths` are the random numbers of its path. One loop for camera and path: each heavy
+// function is called at few places, because shader compilers copy functions to where they are called.
 fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
     var begun: Begun;
     var out: Taken;

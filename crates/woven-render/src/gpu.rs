@@ -17,8 +17,8 @@ use crate::accumulate::{Accumulation, PixelSum};
 use crate::cpu::path::View;
 use crate::cpu::share::{BLOCK, shift};
 use crate::table::Table;
-use buffers::Buffers;
-pub use buffers::Frame;
+use buffers::{Buffers, range};
+pub use buffers::{Frame, SLOT};
 use device::Device;
 use pipeline::Pipeline;
 
@@ -111,8 +111,8 @@ impl Gpu {
             }
             // A pass gives every pixel one sample. Small ones are sent together, large ones cut into ranges of blocks.
             let blocks = self.blocks(self.samples);
-            let most = self.context.device.max_groups;
-            if self.load >= 2 * blocks && blocks < most {
+            let most = range(self.width, self.height).min(self.context.device.max_groups);
+            if self.load >= 2 * blocks && blocks <= most {
                 let together = (self.load / blocks).min(goal - self.samples);
                 let began = Instant::now();
                 let mut sent = None;
@@ -161,9 +161,11 @@ impl Gpu {
                 label: Some("path"),
                 timestamp_writes: None,
             });
-            pass.set_pipeline(&self.context.pipeline.pipeline);
             pass.set_bind_group(0, &self.buffers.group, &[]);
-            pass.dispatch_workgroups(groups, 1, 1);
+            for pipeline in &self.context.pipeline.passes {
+                pass.set_pipeline(pipeline);
+                pass.dispatch_workgroups(groups, 1, 1);
+            }
         }
         queue.submit([encoder.finish()])
     }

@@ -5,7 +5,7 @@ use std::mem::{offset_of, size_of};
 use naga::{Module, TypeInner};
 use woven_render::accumulate::PixelSum;
 use woven_render::bvh::{Node, Packet};
-use woven_render::gpu::{Frame, source};
+use woven_render::gpu::{Frame, SLOT, source};
 use woven_render::table::{Globals, LightRow, MaterialRow, Shade, TextureRow};
 
 /// Name, offset of each member, and the size of a struct of the shader.
@@ -46,6 +46,7 @@ fn rows_lie_where_the_shader_reads_them() {
         .validate(&module)
         .expect("a valid shader");
     let m = &module;
+    assert_eq!(u64::from(layout(m, "Slot").1), SLOT, "size of Slot");
     same!(m, Node, lo, hi, child);
     same!(m, Packet, v0, e1, e2, gap);
     same!(

@@ -9,7 +9,7 @@ use super::pipeline::Pipeline;
 use crate::accumulate::PixelSum;
 use crate::bvh::{EMPTY, Node, Packet};
 use crate::cpu::path::View;
-use crate::cpu::share::shift;
+use crate::cpu::share::{BLOCK, shift};
 use crate::table::{Globals, LightRow, MaterialRow, Shade, Table};
 
 /// What one submit is told.
@@ -66,10 +66,21 @@ impl Frame {
     }
 }
 
+/// Bytes of the shader's `Slot`; a test compares them.
+pub const SLOT: u64 = 1424;
+/// Most blocks of one submit: their slots take about 100 MB.
+const RANGE: u32 = 1024;
+
+/// Blocks of pixels for whose paths there is room.
+pub(super) fn range(width: u32, height: u32) -> u32 {
+    ((width / BLOCK + 2) * (height / BLOCK + 2)).min(RANGE)
+}
+
 /// Everything the shader binds.
 pub(super) struct Buffers {
     pub(super) frame: wgpu::Buffer,
     pub(super) sums: wgpu::Buffer,
+    slots: wgpu::Buffer,
     pub(super) group: wgpu::BindGroup,
     scene: Vec<wgpu::Buffer>,
 }
@@ -87,7 +98,7 @@ impl Buffers {
             device,
             "frame",
             size_of::<Frame>() as u64,
-            Use::UNIFORM | Use::COPY_DST,
+            Use::STORAGE | Use::COPY_DST,
         )?;
         let size = pixels * size_of::<PixelSum>() as u64;
         let sums = buffer(
@@ -96,11 +107,14 @@ impl Buffers {
             size,
             Use::STORAGE | Use::COPY_DST | Use::COPY_SRC,
         )?;
+        let size = u64::from(range(view.width, view.height)) * 64 * SLOT;
+        let slots = buffer(device, "paths", size, Use::STORAGE)?;
         let scene = upload(device, table)?;
-        let group = bind(device, pipeline, &frame, &scene, &sums);
+        let group = bind(device, pipeline, &frame, &scene, [&sums, &slots]);
         Ok(Self {
             frame,
             sums,
+            slots,
             group,
             scene,
         })
@@ -125,7 +139,8 @@ impl Buffers {
             return device.check();
         }
         self.scene = upload(device, table)?;
-        self.group = bind(device, pipeline, &self.frame, &self.scene, &self.sums);
+        let written = [&self.sums, &self.slots];
+        self.group = bind(device, pipeline, &self.frame, &self.scene, written);
         Ok(())
     }
 }
@@ -214,11 +229,9 @@ fn bind(
     pipeline: &Pipeline,
     frame: &wgpu::Buffer,
     scene: &[wgpu::Buffer],
-    sums: &wgpu::Buffer,
+    written: [&wgpu::Buffer; 2],
 ) -> wgpu::BindGroup {
-    let all = std::iter::once(frame)
-        .chain(scene)
-        .chain(std::iter::once(sums));
+    let all = std::iter::once(frame).chain(scene).chain(written);
     let entries: Vec<_> = all
         .enumerate()
         .map(|(i, b)| wgpu::BindGroupEntry {

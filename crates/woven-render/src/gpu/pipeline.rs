@@ -28,9 +28,14 @@ pub fn source() -> String {
     .join("\n")
 }
 
+/// The passes of a sample, in their order; names of functions in `shader/share.wgsl`.
+const PASSES: [&str; 3] = ["start", "see", "finish"];
+/// Bindings that the passes only read; two that they write follow.
+const READ_ONLY: u32 = 8;
+
 /// The compiled shader.
 pub(super) struct Pipeline {
-    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) passes: Vec<wgpu::ComputePipeline>,
     pub(super) layout: wgpu::BindGroupLayout,
 }
 
@@ -40,15 +45,41 @@ impl Pipeline {
             label: Some("woven-render"),
             source: wgpu::ShaderSource::Wgsl(source().into()),
         });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("path"),
-            layout: None,
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
+        let entry = |binding: u32| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage {
+                    read_only: binding < READ_ONLY,
+                },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let entries: Vec<_> = (0..READ_ONLY + 2).map(entry).collect();
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("scene"),
+            entries: &entries,
         });
-        let layout = pipeline.get_bind_group_layout(0);
-        Self { pipeline, layout }
+        let of_all = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("scene"),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let passes = PASSES
+            .iter()
+            .map(|name| {
+                device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                    label: Some(name),
+                    layout: Some(&of_all),
+                    module: &module,
+                    entry_point: Some(name),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    cache: None,
+                })
+            })
+            .collect();
+        Self { passes, layout }
     }
 }

@@ -115,8 +115,8 @@ fn reflectance(m: u32, s: Surface) -> vec3<f32> {
     return sum * s.tint;
 }
 
-// A sample of pixel (x, y); `paths` are the random numbers of its path. One loop for camera and path: each heavy function is called at one place, because
-// shader compilers copy functions to where they are called.
+// A sample of pixel (x, y); `paths` are the random numbers of its path. One loop for camera and path: each heavy
+// function is called at few places, because shader compilers copy functions to where they are called.
 fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
     var begun: Begun;
     var out: Taken;
@@ -211,11 +211,16 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
                 let at = place_of(s.material, s, ray.d);
                 let wo = local(s, -ray.d);
                 // The camera and the path draw from numbers of their own.
-                var lit: Incident;
+                var numbers = rng;
+                if (!camera) {
+                    numbers = *paths;
+                }
+                let u = rng_set(&numbers, select(2u * bounce + 1u, 1u + bounce, camera));
+                let lit = incident(s.material, s, at, wo, u, &numbers);
                 if (camera) {
-                    lit = incident(s.material, s, at, wo, rng_set(&rng, 1u + bounce), &rng);
+                    rng = numbers;
                 } else {
-                    lit = incident(s.material, s, at, wo, rng_set(paths, 2u * bounce + 1u), paths);
+                    *paths = numbers;
                     // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
                     let yarn = 1.0 / max(1.0 - gap, 1e-6);
                     carry *= yarn;

@@ -1,43 +1,56 @@
 // Pixels of a block share the second points of their paths; the pair of cpu/share.rs. A workgroup is a block.
+//
+// Three passes, each over all blocks of a range, in place of barriers: `start` follows the paths, `see` looks at the
+// second points, `finish` adds what they scatter.
 
 const BLOCK: u32 = 8u;
 const GROUP: u32 = 64u;
 const KEPT: f32 = 16.0;
 const PATHS: u32 = 0x70617468u;
-// So many second points are looked at between two barriers.
-const BATCH: u32 = 4u;
 
-// What the others need of a second point.
-struct Shared {
+// What the passes leave to each other for one pixel.
+struct Slot {
+    // Where the camera ray is scattered; no material: nowhere.
     p: vec3<f32>,
     material: u32,
     ng: vec3<f32>,
-    // 1: the points that may look have it before them.
-    side: u32,
-    fx: vec3<f32>,
     alpha: f32,
+    fx: vec3<f32>,
+    // Of the gaps on the own path's way to its second point.
+    passed: f32,
+    fz: vec3<f32>,
+    // Decides whether the second point is kept.
+    coin: f32,
+    wo: vec3<f32>,
+    // What the second point scatters, about.
+    brightness: f32,
+    tint: vec3<f32>,
+    throughput: vec3<f32>,
+    second: SecondRow,
+    taken: PixelSum,
+    // Of the second points that are kept, in order: density and what the pixel takes of their light.
+    sights: array<vec4<f32>, GROUP>,
+}
+
+struct SecondRow {
+    p: vec3<f32>,
+    material: u32,
+    ng: vec3<f32>,
+    alpha: f32,
+    fx: vec3<f32>,
+    // 1: who looks has it before him.
+    side: u32,
     fz: vec3<f32>,
     layer: u32,
     tint: vec3<f32>,
     pdf: f32,
     lit_wi: vec3<f32>,
-    q: f32,
     light: vec3<f32>,
-    brightness: f32,
     wi: vec3<f32>,
-    place: u32,
     beyond: array<vec4<f32>, LAYERS>,
 }
 
-var<workgroup> seconds: array<Shared, GROUP>;
-// Numbers of those that are kept, in their order, and how many.
-var<workgroup> order: array<u32, GROUP>;
-var<workgroup> count: u32;
-var<workgroup> densities: array<f32, 256>;
-
-fn finite(v: vec3<f32>) -> bool {
-    return all(abs(v) < vec3<f32>(1e30));
-}
+@group(0) @binding(9) var<storage, read_write> slots: array<Slot>;
 
 fn brightness(y: Second) -> f32 {
     var sum = y.lit.light;
@@ -48,181 +61,226 @@ fn brightness(y: Second) -> f32 {
     return select(0.0, l, abs(l) < 1e30);
 }
 
-struct Sight {
-    density: f32,
-    carry: vec3<f32>,
-    d: vec3<f32>,
+// Left upper corner of a block.
+fn corner_of(block: u32) -> vec2<i32> {
+    let columns = (frame.width + frame.left + BLOCK - 1u) / BLOCK;
+    return vec2<i32>(vec2<u32>(block % columns, block / columns) * BLOCK) - vec2<i32>(vec2<u32>(frame.left, frame.above));
 }
 
-fn look(x: Vertex, i: u32, own: bool, own_passed: f32, rng: ptr<function, Rng>) -> Sight {
-    var none: Sight;
-    let start = leave(x.s, seconds[i].p - x.s.p);
-    let to = seconds[i].p - start;
-    let distance2 = max(length2(to), 1e-12);
-    let distance = sqrt(distance2);
-    let d = to * (1.0 / distance);
-    let c = dot(seconds[i].ng, d);
-    if ((c < 0.0) != (seconds[i].side == 1u)) {
-        return none;
+fn inside(pixel: vec2<i32>) -> bool {
+    return all(pixel >= vec2<i32>(0)) && all(pixel < vec2<i32>(vec2<u32>(frame.width, frame.height)));
+}
+
+@compute @workgroup_size(64, 1, 1)
+fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
+    let slot = workgroup.x * GROUP + member;
+    let corner = corner_of(frame.block + workgroup.x);
+    let pixel = corner + vec2<i32>(vec2<u32>(member % BLOCK, member / BLOCK));
+    slots[slot].material = NONE;
+    slots[slot].brightness = 0.0;
+    if (!inside(pixel)) {
+        return;
     }
-    let wi = local(x.s, d);
-    let b = scattering(x.s.material, x.s, x.wo, wi, false, vec3<f32>(0.0));
-    let yarn = 1.0 - gap_of(seconds[i].material, second_surface(i), d);
-    let density = b.pdf * yarn;
-    if (density <= 0.0) {
-        return none;
+    let at = bitcast<vec2<u32>>(corner);
+    let here = hash2((at.x & 0xffffu) | (at.y << 16u), frame.seed ^ PATHS);
+    let turn = hash2(frame.index, here) % GROUP;
+    var paths = rng_new(0u, 0u, frame.index * GROUP + (member ^ turn), here);
+    let b = begin(u32(pixel.x), u32(pixel.y), &paths);
+    slots[slot].coin = rng_coin(&paths);
+    for (var k = 0u; k < LAYERS; k++) {
+        slots[slot].taken.light[k] = vec4<f32>(b.taken.light[k], 0.0);
     }
-    var passed = own_passed;
-    if (!own) {
-        passed = transmittance(ray_new(start, d), distance - (1e-4 + 1e-4 * distance), 1e-12, true, rng);
+    slots[slot].taken.light[1].w = b.taken.gap;
+    slots[slot].taken.light[2].w = b.taken.depth;
+    slots[slot].taken.albedo = vec4<f32>(b.taken.albedo, 0.0);
+    slots[slot].taken.normal = vec4<f32>(b.taken.normal, 0.0);
+    if (!b.has_first) {
+        return;
     }
-    let seen = abs(c) / distance2 * passed;
-    return Sight(density * seen, x.throughput * b.f * (abs(wi.z) * seen), d);
+    slots[slot].material = b.first.s.material;
+    slots[slot].p = b.first.s.p;
+    slots[slot].ng = b.first.s.ng;
+    slots[slot].alpha = b.first.s.alpha;
+    slots[slot].fx = b.first.s.fx;
+    slots[slot].fz = b.first.s.fz;
+    slots[slot].tint = b.first.s.tint;
+    slots[slot].wo = b.first.wo;
+    slots[slot].throughput = b.first.throughput;
+    if (!b.has_second) {
+        return;
+    }
+    slots[slot].brightness = brightness(b.second);
+    slots[slot].passed = b.second.passed;
+    slots[slot].second.p = b.second.s.p;
+    slots[slot].second.material = b.second.s.material;
+    slots[slot].second.ng = b.second.s.ng;
+    slots[slot].second.alpha = b.second.s.alpha;
+    slots[slot].second.fx = b.second.s.fx;
+    slots[slot].second.side = u32(dot(b.second.s.ng, b.second.s.p - b.first.s.p) < 0.0);
+    slots[slot].second.fz = b.second.s.fz;
+    slots[slot].second.layer = b.second.lit.layer;
+    slots[slot].second.tint = b.second.s.tint;
+    slots[slot].second.pdf = b.second.lit.pdf;
+    slots[slot].second.lit_wi = b.second.lit.wi;
+    slots[slot].second.light = b.second.lit.light;
+    slots[slot].second.wi = b.second.wi;
+    for (var k = 0u; k < LAYERS; k++) {
+        slots[slot].second.beyond[k] = vec4<f32>(b.second.beyond[k], 0.0);
+    }
+}
+
+// Probability with which the second point of a slot is kept, 0 if it was not.
+fn keeping(slot: u32, total: f32) -> f32 {
+    let q = min(KEPT * slots[slot].brightness / total, 1.0);
+    return select(0.0, q, total > 0.0 && slots[slot].coin < q);
+}
+
+fn total_of(base: u32) -> f32 {
+    var total = 0.0;
+    for (var k = 0u; k < GROUP; k++) {
+        total += slots[base + k].brightness;
+    }
+    return total;
+}
+
+fn first_surface(i: u32) -> Surface {
+    var s: Surface;
+    s.p = slots[i].p;
+    s.ng = slots[i].ng;
+    s.fx = slots[i].fx;
+    s.fz = slots[i].fz;
+    s.fy = cross(s.fz, s.fx);
+    s.material = slots[i].material;
+    s.tint = slots[i].tint;
+    s.alpha = slots[i].alpha;
+    return s;
 }
 
 fn second_surface(i: u32) -> Surface {
     var s: Surface;
-    s.p = seconds[i].p;
-    s.ng = seconds[i].ng;
-    s.fx = seconds[i].fx;
-    s.fz = seconds[i].fz;
+    s.p = slots[i].second.p;
+    s.ng = slots[i].second.ng;
+    s.fx = slots[i].second.fx;
+    s.fz = slots[i].second.fz;
     s.fy = cross(s.fz, s.fx);
-    s.material = seconds[i].material;
-    s.tint = seconds[i].tint;
-    s.alpha = seconds[i].alpha;
+    s.material = slots[i].second.material;
+    s.tint = slots[i].second.tint;
+    s.alpha = slots[i].second.alpha;
     return s;
 }
 
-// Adds the light of second point i, seen along d, to the sample.
-fn add_second(out: ptr<function, Taken>, i: u32, d: vec3<f32>, carry: vec3<f32>) {
-    let s = second_surface(i);
-    let wo = local(s, -d);
-    // Light that was sampled there, then what the path found beyond: one place for the scattering.
-    for (var part = 0u; part < 2u; part++) {
-        let wi = local(s, select(seconds[i].wi, seconds[i].lit_wi, part == 0u));
-        let b = scattering(s.material, s, wo, wi, false, vec3<f32>(0.0));
-        if (part == 0u) {
-            var value = b.f * seconds[i].light;
-            if (seconds[i].pdf > 0.0) {
-                value *= heuristic(seconds[i].pdf, b.pdf);
-            }
-            add_light(out, seconds[i].layer, value * carry);
-        } else {
-            let f = b.f * carry;
-            for (var k = 0u; k < LAYERS; k++) {
-                (*out).light[k] += f * seconds[i].beyond[k].xyz;
+@compute @workgroup_size(64, 1, 1)
+fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
+    let base = workgroup.x * GROUP;
+    let slot = base + member;
+    let total = total_of(base);
+    let has = slots[slot].material != NONE;
+    var x: Surface;
+    if (has) {
+        x = first_surface(slot);
+    }
+    // No coin is tossed on the way.
+    var unused = Rng(0u, 0u, 0u);
+    var n = 0u;
+    for (var k = 0u; k < GROUP; k++) {
+        let i = base + k;
+        if (keeping(i, total) <= 0.0) {
+            continue;
+        }
+        var sight = vec4<f32>(0.0);
+        if (has) {
+            let y = slots[i].second.p;
+            let begin = leave(x, y - x.p);
+            let to = y - begin;
+            let distance2 = max(length2(to), 1e-12);
+            let distance = sqrt(distance2);
+            let d = to * (1.0 / distance);
+            let c = dot(slots[i].second.ng, d);
+            if ((c < 0.0) == (slots[i].second.side == 1u)) {
+                let wi = local(x, d);
+                let b = scattering(x.material, x, slots[slot].wo, wi, false, vec3<f32>(0.0));
+                let density = b.pdf * (1.0 - gap_of(slots[i].second.material, second_surface(i), d));
+                if (density > 0.0) {
+                    var passed = slots[slot].passed;
+                    if (k != member) {
+                        passed = transmittance(
+                            ray_new(begin, d), distance - (1e-4 + 1e-4 * distance), 1e-12, true, &unused,
+                        );
+                    }
+                    let seen = abs(c) / distance2 * passed;
+                    let carry = slots[slot].throughput * b.f * (abs(wi.z) * seen);
+                    sight = vec4<f32>(carry, density * seen);
+                }
             }
         }
+        slots[slot].sights[n] = sight;
+        n += 1u;
     }
 }
 
 @compute @workgroup_size(64, 1, 1)
-fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
-    let block = frame.block + workgroup.x;
-    let columns = (frame.width + frame.left + BLOCK - 1u) / BLOCK;
-    let x0 = i32((block % columns) * BLOCK) - i32(frame.left);
-    let y0 = i32((block / columns) * BLOCK) - i32(frame.above);
-    let x = x0 + i32(member % BLOCK);
-    let y = y0 + i32(member / BLOCK);
-    let inside = x >= 0 && y >= 0 && x < i32(frame.width) && y < i32(frame.height);
-    let here = hash2((bitcast<u32>(x0) & 0xffffu) | (bitcast<u32>(y0) << 16u), frame.seed ^ PATHS);
-    let turn = hash2(frame.index, here) % GROUP;
-    var paths = rng_new(0u, 0u, frame.index * GROUP + (member ^ turn), here);
-    var begun: Begun;
-    var mine: Shared;
-    var coin = 2.0;
-    if (inside) {
-        begun = begin(u32(x), u32(y), &paths);
-        coin = rng_coin(&paths);
-        if (begun.has_second) {
-            let y = begun.second;
-            mine.p = y.s.p;
-            mine.material = y.s.material;
-            mine.ng = y.s.ng;
-            mine.side = u32(dot(y.s.ng, y.s.p - begun.first.s.p) < 0.0);
-            mine.fx = y.s.fx;
-            mine.fz = y.s.fz;
-            mine.alpha = y.s.alpha;
-            mine.tint = y.s.tint;
-            mine.layer = y.lit.layer;
-            mine.pdf = y.lit.pdf;
-            mine.lit_wi = y.lit.wi;
-            mine.light = y.lit.light;
-            mine.wi = y.wi;
-            mine.brightness = brightness(y);
-            for (var k = 0u; k < LAYERS; k++) {
-                mine.beyond[k] = vec4<f32>(y.beyond[k], 0.0);
-            }
-        }
+fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
+    let pixel = corner_of(frame.block + workgroup.x) + vec2<i32>(vec2<u32>(member % BLOCK, member / BLOCK));
+    if (!inside(pixel)) {
+        return;
     }
-    seconds[member] = mine;
-    workgroupBarrier();
-    var total = 0.0;
-    for (var k = 0u; k < GROUP; k++) {
-        total += seconds[k].brightness;
-    }
-    let q = min(KEPT * mine.brightness / total, 1.0);
-    let stays = total > 0.0 && coin < q;
-    workgroupBarrier();
-    seconds[member].q = select(0.0, q, stays);
-    workgroupBarrier();
-    var before = 0u;
-    var all_kept = 0u;
-    for (var k = 0u; k < GROUP; k++) {
-        let one = u32(seconds[k].q > 0.0);
-        all_kept += one;
-        before += select(0u, one, k < member);
-    }
-    if (stays) {
-        order[before] = member;
-    }
-    if (member == 0u) {
-        count = all_kept;
-    }
-    let kept = workgroupUniformLoad(&count);
-    var taken = begun.taken;
-    for (var first = 0u; first < kept; first += BATCH) {
-        var sights: array<Sight, BATCH>;
-        for (var n = 0u; n < BATCH; n++) {
-            var sight: Sight;
-            if (first + n < kept && begun.has_first) {
-                let i = order[first + n];
-                sight = look(begun.first, i, i == member, begun.second.passed, &paths);
-            }
-            sights[n] = sight;
-            densities[n * GROUP + member] = sight.density;
-        }
-        workgroupBarrier();
-        for (var n = 0u; n < BATCH; n++) {
-            if (sights[n].density > 0.0) {
-                let i = order[first + n];
-                var sum = 0.0;
-                for (var k = 0u; k < GROUP; k++) {
-                    sum += densities[n * GROUP + k];
-                }
-                add_second(&taken, i, sights[n].d, sights[n].carry * (1.0 / (seconds[i].q * sum)));
-            }
-        }
-        workgroupBarrier();
-    }
-    if (inside) {
-        store(u32(y) * frame.width + u32(x), taken);
-    }
-}
-
-fn store(pixel: u32, s: Taken) {
-    var sum = sums[pixel];
-    var every = vec3<f32>(0.0);
+    let base = workgroup.x * GROUP;
+    let slot = base + member;
+    let total = total_of(base);
+    var light: array<vec3<f32>, LAYERS>;
     for (var k = 0u; k < LAYERS; k++) {
-        let l = select(vec3<f32>(0.0), s.light[k], finite(s.light[k]));
-        every += l;
-        sum.light[k] += vec4<f32>(l, 0.0);
+        light[k] = slots[slot].taken.light[k].xyz;
     }
-    let lum = luminance(every);
-    sum.light[0].w += lum * lum;
-    sum.light[1].w += s.gap;
-    sum.light[2].w += s.depth;
-    sum.albedo += vec4<f32>(s.albedo, 0.0);
-    sum.normal += vec4<f32>(s.normal, 0.0);
-    sums[pixel] = sum;
+    var x: Surface;
+    if (slots[slot].material != NONE) {
+        x = first_surface(slot);
+    }
+    var n = 0u;
+    for (var m = 0u; m < GROUP; m++) {
+        let i = base + m;
+        let q = keeping(i, total);
+        if (q <= 0.0) {
+            continue;
+        }
+        let sight = slots[slot].sights[n];
+        if (sight.w > 0.0) {
+            var all_densities = 0.0;
+            for (var k = 0u; k < GROUP; k++) {
+                all_densities += slots[base + k].sights[n].w;
+            }
+            let carry = sight.xyz * (1.0 / (q * all_densities));
+            let s = second_surface(i);
+            let to = s.p - leave(x, s.p - x.p);
+            let wo = local(s, to * (-1.0 / sqrt(max(length2(to), 1e-12))));
+            // Light that was sampled there, then what the path found beyond: one place for the scattering.
+            for (var part = 0u; part < 2u; part++) {
+                let wi = local(s, select(slots[i].second.wi, slots[i].second.lit_wi, part == 0u));
+                let b = scattering(s.material, s, wo, wi, false, vec3<f32>(0.0));
+                if (part == 0u) {
+                    var value = b.f * slots[i].second.light;
+                    if (slots[i].second.pdf > 0.0) {
+                        value *= heuristic(slots[i].second.pdf, b.pdf);
+                    }
+                    light[slots[i].second.layer] += value * carry;
+                } else {
+                    let f = b.f * carry;
+                    for (var k = 0u; k < LAYERS; k++) {
+                        light[k] += f * slots[i].second.beyond[k].xyz;
+                    }
+                }
+            }
+        }
+        n += 1u;
+    }
+    let place = u32(pixel.y) * frame.width + u32(pixel.x);
+    var sum = vec3<f32>(0.0);
+    for (var k = 0u; k < LAYERS; k++) {
+        let l = select(vec3<f32>(0.0), light[k], all(abs(light[k]) < vec3<f32>(1e30)));
+        sum += l;
+        sums[place].light[k] += vec4<f32>(l, slots[slot].taken.light[k].w);
+    }
+    let lum = luminance(sum);
+    sums[place].light[0].w += lum * lum;
+    sums[place].albedo += slots[slot].taken.albedo;
+    sums[place].normal += slots[slot].taken.normal;
 }

@@ -123,7 +123,8 @@ struct PixelSum {
     normal: vec4<f32>,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+// Storage, not uniform: lavapipe compiles a shader anew whenever the numbers in a uniform buffer change.
+@group(0) @binding(0) var<storage, read> frame: Frame;
 @group(0) @binding(1) var<storage, read> nodes: array<Node>;
 @group(0) @binding(2) var<storage, read> packets: array<Packet>;
 @group(0) @binding(3) var<storage, read> shades: array<Shade>;

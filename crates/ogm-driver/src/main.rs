@@ -42,14 +42,14 @@ enum Command {
     Plan(PlanArgs),
     /// Chooses the poses that tell most about a fabric's parameters, out of a plan's, and writes a plan of them.
     #[command(
-        after_help = "Example: ogm next --fabric fit.toml --plan crates/ogm-driver/plans/paper.toml --known lace.ogm --count 100 -o more.toml"
+        after_help = "Example: ogm next --fabric fit.toml --plan crates/ogm-driver/plans/paper.toml --known lace.ogm --for alpha_x,alpha_y --count 100 -o more.toml\n\nThen scan more.toml into more.ogm, and merge both logs into one measurement."
     )]
     Next(NextArgs),
     /// Looks at a scan again without the rig: checks every record against its plan and rig, and recomputes the measurement.
     #[command(after_help = "Example: ogm replay lace.ogm")]
     Replay(ReplayArgs),
-    /// Merges a scan log into a measurement: .csv, .txt (pgII text, one file for each incidence), or .xml (a whole Klems matrix).
-    #[command(after_help = "Example: ogm merge lace.ogm -o lace.csv")]
+    /// Merges scan logs into a measurement: .csv, .txt (pgII text, one file for each incidence), or .xml (a whole Klems matrix).
+    #[command(after_help = "Example: ogm merge lace.ogm more.ogm -o lace.csv")]
     Merge(MergeArgs),
 }
 

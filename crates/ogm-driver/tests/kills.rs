@@ -83,7 +83,7 @@ fn scan(sim: &PtyRig, folder: &Path, log: &str) -> Child {
         "scan",
         "--verbose",
         "--rig",
-        "instant",
+        "rig.toml",
         "--port",
         sim.port(),
         "--plan",
@@ -109,7 +109,12 @@ fn kill_9_loses_nothing_doubles_nothing_and_changes_nothing() {
         "straight_through = false\nname = 'kill'\n[grid]\nkind = 'random'\ncount = {points}\nseed = 4\ntheta_max = 70\n[exposure]\nladder_ms = [1, 16, 256]\n"
     );
     std::fs::write(folder.join("plan.toml"), plan).unwrap();
-    let rig = Rig::default().with_instant_motors();
+    let mut rig = Rig::default();
+    for axis in &mut rig.axes {
+        axis.degrees_per_pulse = 0.02; // half a turn in 20 ms at the fastest pulse rate the controller knows
+    }
+    let rig = rig.with_instant_motors();
+    std::fs::write(folder.join("rig.toml"), toml::to_string(&rig).unwrap()).unwrap();
     let sim = common::rig_behind_pty(&rig, 1000.0, &[]);
     let whole = session(scan(&sim, folder, "whole.ogm"), &Moment::Never);
     assert!(whole.success, "{}", whole.error);

@@ -6,7 +6,6 @@ mod common;
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -15,6 +14,7 @@ use ogm_driver::rig::Rig;
 use ogm_driver::sim::PtyRig;
 use ogm_driver::sim::device::WireLine;
 use ogm_driver::sim::noise::Noise;
+use rustix::process::{Pid, Signal, kill_process};
 
 const PLAN: &str = "name = 's'\n[grid]\nkind = 'random'\ncount = 20\nseed = 1\n[exposure]\nladder_ms = [1, 50, 200]\n[calibration]\ndark = 1\ndirect = 1\nwhite = false";
 
@@ -89,14 +89,13 @@ fn one_stop(k: u64, folder: &Path) -> Option<Stop> {
     std::thread::sleep(Duration::from_secs_f64(1.5 * noise.uniform()));
     let before = lines(&sim);
     let moment = Instant::now();
-    let pid = child.id().to_string();
-    let sent = Command::new("kill").args(["-INT", &pid]).status().unwrap();
+    let sent = kill_process(Pid::from_child(&child), Signal::INT);
     let at = Instant::now();
     std::thread::sleep(Duration::from_millis(10));
     let control = at.elapsed().saturating_sub(Duration::from_millis(10));
     let done = child.wait_with_output().unwrap();
     let text = String::from_utf8_lossy(&done.stderr);
-    if !sent.success() || !text.contains("Stopped by request") {
+    if sent.is_err() || !text.contains("Stopped by request") {
         return None; // it had ended before
     }
     assert_eq!(done.status.code(), Some(1));

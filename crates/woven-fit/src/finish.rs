@@ -1,7 +1,7 @@
 //! The end of one fit: from a good start to the minimum on all points, its profiles, and how well it foretells incidences
 //! that it did not see.
 
-use crate::fit::Options;
+use crate::fit::{Options, Profiles};
 use crate::linalg::dot;
 use crate::measurement::{Point, Points};
 use crate::problem::{Evaluator, Joint, Metric, Separable, Spec};
@@ -192,7 +192,12 @@ pub(crate) fn finish_with_profiles(
     start: &[f64],
 ) -> Option<Finished> {
     let mut best = finish(spec, full, options, floor, start)?;
-    if full.nodes.len() > LARGE && !options.profile {
+    let wanted = match options.profiles {
+        Profiles::Auto => full.nodes.len() <= LARGE,
+        Profiles::Always => true,
+        Profiles::Never => false,
+    };
+    if !wanted {
         return Some(best);
     }
     for _ in 0..3 {

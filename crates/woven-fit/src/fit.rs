@@ -35,8 +35,8 @@ pub struct Options {
     pub cosine_weights: bool,
     /// Cross-validate over incidences also where that takes long (matrices of thousands of values).
     pub cross_validate: bool,
-    /// Look at profiles of the sum of squares also there.
-    pub profile: bool,
+    /// Where to look whether the covariance misleads.
+    pub profiles: Profiles,
 }
 
 impl Default for Options {
@@ -50,9 +50,21 @@ impl Default for Options {
             loss: Loss::Squares,
             cosine_weights: false,
             cross_validate: false,
-            profile: false,
+            profiles: Profiles::Auto,
         }
     }
+}
+
+/// Where profiles of the sum of squares are looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Profiles {
+    /// Where that is quick: not in matrices of thousands of values.
+    #[default]
+    Auto,
+    /// Everywhere.
+    Always,
+    /// Nowhere: scores alone are wanted.
+    Never,
 }
 
 /// A fitted parameter.

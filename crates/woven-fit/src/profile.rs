@@ -112,7 +112,7 @@ pub fn ranges<P: Residuals + ?Sized>(
         if step == 0.0 || !step.is_finite() {
             continue;
         }
-        if !bounded && walk.is_straight(j, &along, quantiles[1] * step, quantiles[1]) {
+        if !bounded && walk.is_straight(&along, quantiles[1] * step, quantiles[1]) {
             continue;
         }
         let lower = walk.side(j, &along, -step, &quantiles)?;
@@ -143,20 +143,15 @@ impl<P: Residuals + ?Sized> Walk<'_, P> {
     }
 
     /// Whether straight steps of `reach` to both sides raise the sum of squares as the covariance foretells.
-    fn is_straight(&mut self, j: usize, along: &[f64], reach: f64, quantile: f64) -> bool {
+    fn is_straight(&mut self, along: &[f64], reach: f64, quantile: f64) -> bool {
         let mut r = vec![0.0; self.problem.rows()];
         [-reach, reach].into_iter().all(|t| {
-            let x: Vec<f64> = self
-                .best
-                .iter()
-                .zip(along)
-                .map(|(b, a)| b + t * a)
-                .collect();
+            let at = self.best.iter().zip(along);
+            let x: Vec<f64> = at.map(|(b, a)| b + t * a).collect();
             let inside = x.iter().enumerate().all(|(i, x)| {
                 let (lo, hi) = self.problem.bounds(i);
                 (lo..=hi).contains(x)
             });
-            debug_assert!(along[j] == 1.0);
             inside && self.problem.evaluate(&x, &mut r, None) && {
                 let excess = crate::linalg::dot(&r, &r) - self.sse;
                 let root = (excess.max(0.0) / self.variance).sqrt();
@@ -272,5 +267,82 @@ impl<P: Residuals + ?Sized> Walk<'_, P> {
             }
         }
         Ok(ends)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::uncertainty::uncertainty;
+
+    /// Four values of x² with the mean 4; the second parameter is a nuisance that only the last row sees.
+    struct Square {
+        least: f64,
+    }
+
+    impl Residuals for Square {
+        fn rows(&self) -> usize {
+            5
+        }
+        fn params(&self) -> usize {
+            2
+        }
+        fn bounds(&self, j: usize) -> (f64, f64) {
+            let least = if j == 0 { self.least } else { -100.0 };
+            (least, 100.0)
+        }
+        fn evaluate(&mut self, x: &[f64], r: &mut [f64], jac: Option<&mut [f64]>) -> bool {
+            for (r, y) in r.iter_mut().zip([2.5, 5.5, 3.0, 5.0]) {
+                *r = x[0] * x[0] - y;
+            }
+            r[4] = x[1] - 3.0 * x[0];
+            if let Some(jac) = jac {
+                jac.copy_from_slice(&[2.0 * x[0]; 10]);
+                jac[4..].copy_from_slice(&[-3.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+            }
+            true
+        }
+    }
+
+    fn range_of_x(least: f64) -> (Option<Range>, f64) {
+        let mut problem = Square { least };
+        let s = solve(&mut problem, &[3.0, 3.0], &Settings::default());
+        assert!((s.x[0] - 2.0).abs() < 1e-9 && (s.x[1] - 6.0).abs() < 1e-9);
+        let u = uncertainty(&s.jacobian, 5, &["x", "y"], &s.x, &s.at_bound, s.sse, true);
+        let ranges = ranges(&mut problem, &s.x, &s.at_bound, &u, s.sse).unwrap();
+        (ranges[0], (s.sse / 3.0).sqrt())
+    }
+
+    #[test]
+    fn a_bent_profile_gives_its_own_crossings() {
+        // 4 (x² - 4)² = t² s²: the covariance would be symmetric about 2.
+        let (range, s) = range_of_x(0.01);
+        for ((lo, hi), level) in range.unwrap().ends.into_iter().zip(LEVELS) {
+            let half = 0.5 * student(level, 3) * s;
+            let want = |square: f64| {
+                if square > 1e-4 {
+                    End::Crossed(square.sqrt())
+                } else {
+                    End::Bound(0.01)
+                }
+            };
+            for (end, want) in [(lo, want(4.0 - half)), (hi, want(4.0 + half))] {
+                match (end, want) {
+                    // Crossings are found to 2 % of the root, which is steep here.
+                    (End::Crossed(a), End::Crossed(b)) => {
+                        assert!((a - b).abs() < 0.03, "{a} for {b} at {level}");
+                    }
+                    (a, b) => assert_eq!(a, b, "{level}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bound_that_the_data_do_not_exclude_is_a_limit() {
+        let (range, _) = range_of_x(1.9);
+        let [_, (lo, hi), _] = range.unwrap().ends;
+        assert_eq!(lo, End::Bound(1.9));
+        assert!(matches!(hi, End::Crossed(_)));
     }
 }

@@ -4,16 +4,24 @@ mod known;
 
 use known::{coverage, entangled_truth, fit, found_by_aicc, points, spec, table2, truths};
 use rayon::prelude::*;
-use woven_fit::fit::{ModelFit, Options};
+use woven_fit::fit::{ModelFit, Options, Profiles};
 use woven_fit::identify::printed;
 use woven_fit::rank;
 use woven_fit::robust::Loss;
 use woven_fit::synth::SETS;
 
+/// Scores need no profiles.
+fn scores() -> Options {
+    Options {
+        profiles: Profiles::Never,
+        ..Options::default()
+    }
+}
+
 #[test]
 fn the_sets_give_their_known_orders_in_100_of_100_seeds() {
     let specs = table2();
-    let options = Options::default();
+    let options = scores();
     for set in SETS {
         let all: Vec<Vec<f64>> = (0..100u64)
             .into_par_iter()
@@ -56,7 +64,7 @@ fn gaussians_of_the_angle_are_a_tie_in_100_of_100() {
         spec("ward", &["k_d", "k_s", "a_x", "a_y"]),
         spec("cook-torrance", &["k_d", "k_s", "m"]),
     ];
-    let options = Options::default();
+    let options = scores();
     let tied = (0..100u64)
         .into_par_iter()
         .filter(|&seed| {
@@ -99,9 +107,9 @@ fn printed_parameters_have_the_known_ranks() {
 
 #[test]
 fn intervals_cover_the_truth_as_often_as_they_say() {
-    // The evidence bench takes 1,000 scans a model. Here the binomial scatter of 95 % of 120 is 2.0 %: three of them are
-    // allowed; that of 68.27 % is 4.2 %.
-    const SETS: u64 = 120;
+    // The evidence bench takes 1,000 scans a model. Here the binomial scatter of 95 % of 100 is 2.2 %: three of them are
+    // allowed; that of 68.27 % is 4.7 %.
+    const SETS: u64 = 100;
     for (truth, sets) in truths()
         .iter()
         .map(|t| (t, SETS))
@@ -111,12 +119,12 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
             println!("{} {c:?}", truth.spec.label);
             let [c68, c95, c997] = c.shares;
             if c.identifiable() {
-                assert!((0.55..0.82).contains(&c68), "{} {c:?}", truth.name);
-                assert!((0.89..=1.0).contains(&c95), "{} {c:?}", truth.name);
+                assert!((0.54..0.83).contains(&c68), "{} {c:?}", truth.name);
+                assert!((0.884..=1.0).contains(&c95), "{} {c:?}", truth.name);
                 assert!(c997 > 0.96, "{} {c:?}", truth.name);
             } else {
                 // A limit may be cautious, but not bold.
-                assert!(c95 > 0.89, "{} {c:?}", truth.name);
+                assert!(c95 > 0.884, "{} {c:?}", truth.name);
             }
         }
     }

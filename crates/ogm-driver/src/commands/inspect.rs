@@ -6,6 +6,7 @@ use clap::Args;
 
 use ogm_driver::error::{Error, Result};
 use ogm_driver::log;
+use ogm_driver::merge::Measurement;
 use ogm_driver::{merge as merging, replay as replaying};
 
 /// Which log.
@@ -18,12 +19,13 @@ pub(crate) struct ReplayArgs {
 /// Which log, and what becomes of it.
 #[derive(Args)]
 pub(crate) struct MergeArgs {
-    /// The log.
-    log: PathBuf,
+    /// The logs; several of one sample become one measurement.
+    #[arg(required = true)]
+    logs: Vec<PathBuf>,
     /// The measurement.
     #[arg(short, long)]
     output: PathBuf,
-    /// Uses what is readable of a damaged log.
+    /// Uses what is readable of damaged logs.
     #[arg(long)]
     salvage: bool,
 }
@@ -70,9 +72,17 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<()> {
 /// Writes the measurement of a log.
 pub(crate) fn merge(args: &MergeArgs) -> Result<()> {
     let measurement = if args.salvage {
-        merging::merge_contents(&log::read(&args.log)?)?
+        let mut whole: Option<Measurement> = None;
+        for path in &args.logs {
+            let one = merging::merge_contents(&log::read(path)?)?;
+            match &mut whole {
+                Some(m) => m.append(one),
+                None => whole = Some(one),
+            }
+        }
+        whole.unwrap_or_default()
     } else {
-        merging::merge_log(&args.log)?
+        merging::merge_logs(&args.logs)?
     };
     let output = &args.output;
     match output.extension().and_then(|e| e.to_str()) {

@@ -35,9 +35,9 @@ pub(crate) struct NextArgs {
     /// The plan whose poses are the choice.
     #[arg(long)]
     plan: PathBuf,
-    /// A log whose readings are already known.
+    /// A log whose readings are already known; may be given more than once.
     #[arg(long)]
-    known: Option<PathBuf>,
+    known: Vec<PathBuf>,
     /// How many poses.
     #[arg(long)]
     count: usize,
@@ -88,9 +88,9 @@ pub(crate) fn next(args: &NextArgs) -> Result<()> {
     if args.count == 0 || args.count > MOST_POSES {
         return Err(Error::Plan(format!("--count must be 1 to {MOST_POSES}.")));
     }
-    let known = match &args.known {
-        Some(path) => Some(merge::merge_log(path)?),
-        None => None,
+    let known = match args.known.as_slice() {
+        [] => None,
+        logs => Some(merge::merge_logs(logs)?),
     };
     let logged = known.as_ref().map(|m| m.beam);
     let beam = args.beam.or(logged).unwrap_or(600_000.0);

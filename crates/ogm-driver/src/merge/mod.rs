@@ -10,7 +10,7 @@ mod klems;
 mod scale;
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::exposure::Rate;
@@ -68,6 +68,17 @@ pub struct Measurement {
     pub white: Option<(f64, f64)>,
 }
 
+impl Measurement {
+    /// Adds the values of another scan of the same sample; the scale (beam, curvature, white standard) stays that of the first.
+    pub fn append(&mut self, other: Measurement) {
+        self.comments.extend(other.comments);
+        self.samples.extend(other.samples);
+        self.direct.extend(other.direct);
+        self.saturated.extend(other.saturated);
+        self.cut.extend(other.cut);
+    }
+}
+
 /// Merges a log file; damage in the middle is an error.
 ///
 /// # Errors
@@ -82,6 +93,21 @@ pub fn merge_log(path: &Path) -> Result<Measurement> {
         )));
     }
     merge_contents(&contents)
+}
+
+/// Merges several logs of one sample, each on its own scale, into one measurement.
+///
+/// # Errors
+/// As [`merge_log`], and [`Error::Merge`] without any log.
+pub fn merge_logs(paths: &[PathBuf]) -> Result<Measurement> {
+    let Some((first, more)) = paths.split_first() else {
+        return Err(Error::Merge("There is no log to merge.".into()));
+    };
+    let mut out = merge_log(first)?;
+    for path in more {
+        out.append(merge_log(path)?);
+    }
+    Ok(out)
 }
 
 /// Merges what was read of a log, damaged or not; damage is told in the comments.
@@ -291,5 +317,7 @@ fn comments(
     for damage in &contents.damage {
         line("damage in the log", damage);
     }
+    // For the fit, which averages a model over the aperture: its half angle.
+    out.push(format!("aperture_deg,{}", rig.detector.aperture_deg / 2.0));
     out
 }

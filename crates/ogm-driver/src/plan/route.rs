@@ -23,29 +23,35 @@ impl Plan {
     /// [`Error::Limit`] or [`Error::Zone`] for the first forbidden pose (with `forbidden = "refuse"`), [`Error::Plan`].
     pub fn route(&self, rig: &Rig) -> Result<Route> {
         let mut poses = self.grid.poses()?;
+        let mut left_out = 0;
+        if self.forbidden == Forbidden::LeaveOut {
+            let before = poses.len();
+            poses.retain(|p| rig.pulses(*p).is_ok());
+            left_out = before - poses.len();
+        }
         if self.straight_through {
+            let lights: Vec<(f64, f64)> = poses.iter().map(|p| (p.theta_l, p.phi_l)).collect();
             let mut seen: Vec<(f64, f64)> = Vec::new();
-            for p in poses.clone() {
-                if !seen.contains(&(p.theta_l, p.phi_l)) && seen.len() < 10_000 {
-                    seen.push((p.theta_l, p.phi_l));
-                    let straight = Pose::straight_through(p.theta_l, p.phi_l);
-                    if !poses
-                        .iter()
-                        .any(|q| q.light() == p.light() && q.from_straight() < 1e-6)
-                    {
-                        poses.push(straight);
-                    }
+            for (theta_l, phi_l) in lights {
+                if seen.contains(&(theta_l, phi_l)) || seen.len() >= 10_000 {
+                    continue;
+                }
+                seen.push((theta_l, phi_l));
+                let straight = Pose::straight_through(theta_l, phi_l);
+                let same = |q: &Pose| q.light() == straight.light() && q.from_straight() < 1e-6;
+                if poses.iter().any(same) {
+                    continue;
+                }
+                if self.forbidden == Forbidden::Refuse || rig.pulses(straight).is_ok() {
+                    poses.push(straight);
+                } else {
+                    left_out += 1;
                 }
             }
         }
-        let before = poses.len();
-        if self.forbidden == Forbidden::LeaveOut {
-            poses.retain(|p| rig.pulses(*p).is_ok());
-        }
-        let left_out = before - poses.len();
         if poses.is_empty() {
             return Err(refused(format!(
-                "all of its {before} poses lie outside the limits or in the zone of the arms"
+                "all of its {left_out} poses lie outside the limits or in the zone of the arms"
             )));
         }
         let targets: Vec<[i64; AXES]> = poses

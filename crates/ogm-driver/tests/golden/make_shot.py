@@ -1,4 +1,4 @@
-"""Writes shot.txt: conversations with SIGMA KOKI controllers, from a second, independent account of their grammar (see protocol/shot.rs for the sources).
+"""Writes shot.txt: conversations with SIGMA KOKI controllers, from a second, independent account of their grammar (see protocol/shot/mod.rs for the sources).
 
 Lines: "= model" a fresh controller with all counters at 0; "> " to it; "< " its answers; "~" wait until it rests.
 Run: python3 make_shot.py > shot.txt

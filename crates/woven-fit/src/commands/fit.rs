@@ -4,7 +4,7 @@ use super::{command_line, prepare_folder, print, progress_bar, stop_at_ctrl_c, s
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 use woven_fit::convert::write_atomically;
-use woven_fit::fit::{FitResult, Options, fit_measurement, models_named};
+use woven_fit::fit::{FitResult, Options, Profiles, fit_measurement, models_named};
 use woven_fit::problem::Metric;
 use woven_fit::robust::Loss;
 use woven_fit::{figures, report, text};
@@ -16,6 +16,9 @@ pub(super) struct Args {
     data: Vec<PathBuf>,
     #[command(flatten)]
     how: How,
+    /// Where to look whether the covariance misleads: auto leaves out matrices of thousands of values, which take minutes.
+    #[arg(long, value_enum, default_value = "auto")]
+    profiles: Profiles,
     /// Folder for fit.json, the fabric and the report; without it nothing is written.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -45,9 +48,6 @@ pub(super) struct How {
     /// Cross-validate over incidences also for matrices of thousands of values (takes five times as long).
     #[arg(long)]
     cv: bool,
-    /// Look for bent profiles also in matrices of thousands of values (takes minutes).
-    #[arg(long)]
-    profile: bool,
     /// Starts per model.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=4096))]
     starts: u16,
@@ -63,7 +63,7 @@ enum Plane {
 }
 
 impl How {
-    /// The options, with known models.
+    /// The options, with known models and without error bars by profile.
     pub(super) fn options(&self) -> Result<Options> {
         let options = Options {
             models: (self.model != ["all"]).then(|| self.model.clone()),
@@ -74,7 +74,7 @@ impl How {
             loss: self.loss,
             cosine_weights: self.cos_weight,
             cross_validate: self.cv,
-            profile: self.profile,
+            profiles: Profiles::Never,
         };
         models_named(options.models.as_deref())?;
         Ok(options)
@@ -105,7 +105,10 @@ pub(super) fn fit_all(
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let options = args.how.options()?;
+    let options = Options {
+        profiles: args.profiles,
+        ..args.how.options()?
+    };
     if let Some(out) = &args.out {
         prepare_folder(out)?;
     }

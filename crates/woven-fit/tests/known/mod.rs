@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 use woven_bsdf::measured::csv::Scan;
 use woven_bsdf::model;
-use woven_fit::fit::{ModelFit, Options, Parameter};
+use woven_fit::fit::{ModelFit, Options, Parameter, Profiles};
 use woven_fit::measurement::{Detail, Measurement, Points};
 use woven_fit::problem::Spec;
 use woven_fit::robust::Loss;
@@ -161,6 +161,7 @@ pub fn coverage(truth: &Truth, sets: u64) -> Vec<Coverage> {
 pub fn found_by_aicc(truth: &Truth, candidates: &[Truth], sets: u64) -> usize {
     let options = Options {
         starts: 4,
+        profiles: Profiles::Never,
         ..Options::default()
     };
     let wins = |seed: &u64| {
@@ -181,6 +182,7 @@ pub fn outlier_bias(truth: &Truth, loss: Loss, sets: u64) -> f64 {
     let options = Options {
         starts: 2,
         loss,
+        profiles: Profiles::Never,
         ..Options::default()
     };
     let off: Vec<Vec<f64>> = (0..sets)

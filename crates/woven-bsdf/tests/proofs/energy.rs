@@ -8,7 +8,8 @@ use woven_bsdf::vec3::Vec3;
 /// Midpoints in height and azimuth. The height needs many: masking ends it like a square root at grazing.
 const GRID: (usize, usize) = (300, 24);
 
-/// How many settings: `WOVEN_SETTINGS=5000` for the campaign of the audit.
+/// How many settings; `WOVEN_SETTINGS` asks for more. Among 1,500 there is one (sparse flat yarns, narrow lobe, 88.8°) in
+/// which [`GRID`] itself is 0.7 % wrong: it sees 1.007 where lobe, loss and tilted cover integrated finely sum to 0.992.
 fn settings(usual: usize) -> usize {
     let asked = std::env::var("WOVEN_SETTINGS").ok();
     asked.and_then(|n| n.parse().ok()).unwrap_or(usual)

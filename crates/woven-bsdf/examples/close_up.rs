@@ -109,7 +109,7 @@ fn write(yarns: &Yarns, repeats: [usize; 2], path: &Path) -> std::io::Result<()>
     gltf.add(&panel([middle[0], middle[1], -3.0], 5.0, 1.0), 3);
     let bin = path.with_extension("bin");
     let mut json = String::from(
-        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0,1]}],",
+        "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"KHR_materials_emissive_strength\"],\"scene\":0,\"scenes\":[{\"nodes\":[0,1]}],",
     );
     write!(
         json,
@@ -125,16 +125,17 @@ fn write(yarns: &Yarns, repeats: [usize; 2], path: &Path) -> std::io::Result<()>
             "{{\"doubleSided\":true,\"pbrMetallicRoughness\":{{\"baseColorFactor\":{c},\"metallicFactor\":0,\"roughnessFactor\":0.8}}}}"
         )
     };
-    let bright = |c: &str| {
+    let bright = |c: &str, strength: u32| {
         format!(
-            "{{\"emissiveFactor\":{c},\"pbrMetallicRoughness\":{{\"baseColorFactor\":[0,0,0,1]}}}}"
+            "{{\"emissiveFactor\":{c},\"pbrMetallicRoughness\":{{\"baseColorFactor\":[0,0,0,1]}},\
+             \"extensions\":{{\"KHR_materials_emissive_strength\":{{\"emissiveStrength\":{strength}}}}}}}"
         )
     };
     let materials = [
         matt("[0.75,0.68,0.55,1]"),
         matt("[0.35,0.45,0.6,1]"),
-        bright("[1,1,1]"),
-        bright("[0.25,0.22,0.18]"),
+        bright("[1,1,1]", 14),
+        bright("[0.7,0.62,0.5]", 1),
     ];
     write!(
         json,

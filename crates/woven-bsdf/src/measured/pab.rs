@@ -76,6 +76,20 @@ impl Pab {
                     .split_once(|c: char| c.is_whitespace() || c == ':')
                     .unwrap_or((header.trim(), ""));
                 let rest = rest.trim_start_matches([':', ' ', '\t']).trim();
+                const KEYS: [&str; 7] = [
+                    "sample_name",
+                    "intheta",
+                    "inphi",
+                    "upphi",
+                    "incident_angle",
+                    "colorimetry",
+                    "format",
+                ];
+                if !pab.points.is_empty() && KEYS.contains(&key) {
+                    return Err(at(format!(
+                        "{key:?} stands behind the first numbers; one file holds one incidence"
+                    )));
+                }
                 match key {
                     "sample_name" => pab.name = rest.trim_matches('"').to_owned(),
                     "intheta" => theta = Some(numbers::<1>(rest).map_err(at)?[0]),
@@ -86,10 +100,14 @@ impl Pab {
                         (theta, phi) = (Some(t), Some(p));
                     }
                     "colorimetry" => {
-                        pab.channels = if rest.eq_ignore_ascii_case("CIE-XYZ") {
-                            3
-                        } else {
-                            1
+                        pab.channels = match rest.to_uppercase().as_str() {
+                            "CIE-Y" => 1,
+                            "CIE-XYZ" => 3,
+                            _ => {
+                                return Err(at(format!(
+                                    "the colorimetry {rest:?} is unknown; there are CIE-Y and CIE-XYZ"
+                                )));
+                            }
                         }
                     }
                     "format" => quantity = Some(format(rest).map_err(at)?),

@@ -48,6 +48,12 @@ fn pab_errors_name_the_line() {
         ("", "incidence"),
         ("#incident_angle 0 0\n", "format"),
         ("#incident_angle 0\n", "line 1: 1 numbers"),
+        ("#colorimetry: RGB\n", "\"RGB\""),
+        // Found by the fuzzer: colours that begin behind the first point.
+        (
+            "#incident_angle 0 0\n#format: theta phi BSDF\n1 2 3\n#colorimetry: CIE-XYZ\n",
+            "line 4: \"colorimetry\"",
+        ),
         ("#intheta x\n", "\"x\""),
         ("#incident_angle 200 0\n#format: theta phi BSDF\n", "200"),
         ("#format: phi theta BSDF\n", "line 1: the format"),

@@ -6,6 +6,10 @@
 //! `mesh.extras.woven` = `{ "fabric_size": [w, h] m, "grid": [columns, rows], "fps", "frames" }`. UV: u along the weft, v along
 //! the warp from the heading down, 0 to 1. Vertex (i, j) is number j × columns + i; +Y is up, metres.
 //!
+//! `_WOVEN_STRETCH` (an attribute of the mesh and of every target, VEC3 of normalised 16-bit integers, so ±1 in steps of 3e-5):
+//! strain of the warp, strain of the weft and shear in rad, as [`crate::weave_strain`] tells them; in a target the difference
+//! from the rest pose, so that weights blend it as they blend positions. Viewers pass over it; a renderer opens the weave by it.
+//!
 //! **`.pc2`** `POINTCACHE2\0`, then little-endian i32 version 1, i32 points, f32 start 0, f32 rate 1, i32 samples, then f32 x y z for every
 //! point of every sample, in the same order of vertices. **`.mdd`** the same big-endian, with its times in seconds. **`.usda`** a Mesh with time samples of points and
 //! velocities.

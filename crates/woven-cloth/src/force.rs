@@ -6,7 +6,12 @@
 //! * Bending, per three vertices of a thread: E = B A/2 |second difference / h²|² (constant matrix, exact for small strain);
 //!   per cell the twist: E = B_t A |x_ij mixed difference / (hx hy)|², B_t = sqrt(B_warp B_weft).
 
+mod slab;
+
+pub(crate) use slab::{Slab, Terms};
+
 use crate::sheet::{Field, Sheet, half_at_ends};
+use slab::{views, views_mut};
 
 /// Stiffness numbers of shear and bending, made once from the fabric and the grid.
 #[derive(Clone, Debug)]
@@ -54,90 +59,22 @@ impl Shape {
         sum / sheet.mechanics.areal_density
     }
 
-    /// Adds shear forces at positions `x` to `f`, row by row.
+    /// Adds shear forces at positions `x` of a whole sheet to `f`.
     pub(crate) fn add_shear(&self, nx: usize, ny: usize, x: &Field, f: &mut Field) {
-        if self.shear <= 0.0 {
-            return;
-        }
-        for j in 0..ny - 1 {
-            let (r0, r1) = (j * nx, (j + 1) * nx);
-            let row = |c: usize| (&x[c][r0..r1], &x[c][r1..r1 + nx]);
-            let ((x0, x1), (y0, y1), (z0, z1)) = (row(0), row(1), row(2));
-            let [fx, fy, fz] = f;
-            let (fx0, fx1) = fx[r0..r1 + nx].split_at_mut(nx);
-            let (fy0, fy1) = fy[r0..r1 + nx].split_at_mut(nx);
-            let (fz0, fz1) = fz[r0..r1 + nx].split_at_mut(nx);
-            for i in 0..nx - 1 {
-                let e = |a: &[f64], b: &[f64]| {
-                    let (s, t) = (b[i + 1] - a[i], a[i + 1] - b[i]);
-                    ((s + t) * self.rx, (s - t) * self.ry)
-                };
-                let ((ux, vx), (uy, vy), (uz, vz)) = (e(x0, x1), e(y0, y1), e(z0, z1));
-                let t = self.shear * (ux * vx + uy * vy + uz * vz);
-                let (p, q) = (t * self.rx, t * self.ry);
-                // d gamma / d corner: -+ e2/(2hx) -+ e1/(2hy).
-                let add = |f0: &mut [f64], f1: &mut [f64], u: f64, v: f64| {
-                    let (a, b) = (p * v, q * u);
-                    f0[i] += a + b;
-                    f0[i + 1] += b - a;
-                    f1[i] += a - b;
-                    f1[i + 1] -= a + b;
-                };
-                add(fx0, fx1, ux, vx);
-                add(fy0, fy1, uy, vy);
-                add(fz0, fz1, uz, vz);
-            }
-        }
+        let mut terms = Terms::new(nx);
+        self.shear_slab(nx, 0..ny - 1, views(x), views_mut(f), &mut terms);
     }
 
-    /// Adds bending and twist forces at positions `x` to `f`.
+    /// Adds bending and twist forces at positions `x` of a whole sheet to `f`.
     pub(crate) fn add_bending(&self, nx: usize, ny: usize, x: &Field, f: &mut Field) {
-        for (x, f) in x.iter().zip(f.iter_mut()) {
-            for j in 1..ny - 1 {
-                let (a, b, c) = (
-                    &x[(j - 1) * nx..j * nx],
-                    &x[j * nx..(j + 1) * nx],
-                    &x[(j + 1) * nx..(j + 2) * nx],
-                );
-                let (fa, rest) = f[(j - 1) * nx..(j + 2) * nx].split_at_mut(nx);
-                let (fb, fc) = rest.split_at_mut(nx);
-                for i in 0..nx {
-                    let k = if i == 0 || i + 1 == nx {
-                        0.5 * self.bend_warp
-                    } else {
-                        self.bend_warp
-                    };
-                    let t = k * (a[i] - 2.0 * b[i] + c[i]);
-                    fa[i] -= t;
-                    fb[i] += 2.0 * t;
-                    fc[i] -= t;
-                }
-            }
-            for j in 0..ny {
-                let k = self.bend_weft * half_at_ends(j, ny);
-                let (x, f) = (&x[j * nx..(j + 1) * nx], &mut f[j * nx..(j + 1) * nx]);
-                for i in 1..nx - 1 {
-                    let t = k * (x[i - 1] - 2.0 * x[i] + x[i + 1]);
-                    f[i - 1] -= t;
-                    f[i] += 2.0 * t;
-                    f[i + 1] -= t;
-                }
-            }
-            if self.twist > 0.0 {
-                for j in 0..ny - 1 {
-                    let (r0, r1) = (j * nx, (j + 1) * nx);
-                    let (x0, x1) = (&x[r0..r1], &x[r1..r1 + nx]);
-                    let (f0, f1) = f[r0..r1 + nx].split_at_mut(nx);
-                    for i in 0..nx - 1 {
-                        let t = self.twist * (x0[i] - x0[i + 1] - x1[i] + x1[i + 1]);
-                        f0[i] -= t;
-                        f0[i + 1] += t;
-                        f1[i] += t;
-                        f1[i + 1] -= t;
-                    }
-                }
-            }
-        }
+        let mut terms = Terms::new(nx);
+        let slab = Slab {
+            nx,
+            first: 0,
+            rows: ny,
+            ny,
+        };
+        self.bending_slab(slab, 0..ny, views(x), views_mut(f), &mut terms);
     }
 
     fn energy(&self, sheet: &Sheet) -> f64 {

@@ -8,8 +8,8 @@
 pub(crate) const LANES: usize = 8;
 pub(crate) type Lane = [f64; LANES];
 
-/// Work space for eight threads of up to `n` vertices.
-#[derive(Clone, Debug)]
+/// Eight threads of `n` vertices.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Block {
     /// Positions, changed in place by `solve`.
     pub(crate) x: Vec<Lane>,
@@ -19,13 +19,35 @@ pub(crate) struct Block {
     pub(crate) w: Vec<Lane>,
     /// Force of each edge over the step before and, after `solve`, of this one (times h'²; negative is tension), kg m.
     pub(crate) lambda: Vec<Lane>,
-    /// Displacement since the last step, used when there is damping.
-    pub(crate) d: [Vec<Lane>; 3],
+    /// Length of each edge at the start of the step, used when there is damping, m.
+    pub(crate) before: Vec<Lane>,
+}
+
+/// Work space of a solve.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Work {
     nx: Vec<Lane>,
     ny: Vec<Lane>,
     nz: Vec<Lane>,
     c: Vec<Lane>,
     r: Vec<Lane>,
+}
+
+impl Work {
+    /// Room for threads of `n` vertices.
+    pub(crate) fn fit(&mut self, n: usize) {
+        for v in [
+            &mut self.nx,
+            &mut self.ny,
+            &mut self.nz,
+            &mut self.c,
+            &mut self.r,
+        ] {
+            if v.len() < n {
+                v.resize(n, [0.0; LANES]);
+            }
+        }
+    }
 }
 
 /// What the springs of the eight threads have in common.
@@ -50,28 +72,16 @@ impl Block {
             z: lane(),
             w: lane(),
             lambda: lane(),
-            d: [lane(), lane(), lane()],
-            nx: lane(),
-            ny: lane(),
-            nz: lane(),
-            c: lane(),
-            r: lane(),
+            before: lane(),
         }
     }
 
-    /// Fills the lanes from `lanes` on with a copy of the first, so that they hold ordinary numbers.
-    pub(crate) fn fill_spare(&mut self, j: usize, lanes: usize) {
-        for l in lanes..LANES {
-            self.x[j][l] = self.x[j][0];
-            self.y[j][l] = self.y[j][0];
-            self.z[j][l] = self.z[j][0];
-            self.w[j][l] = self.w[j][0];
-            self.lambda[j][l] = self.lambda[j][0];
-        }
-    }
-
-    /// One exact solve of the linearised constraints of a thread of `n` vertices.
-    pub(crate) fn solve(&mut self, n: usize, springs: &Springs) {
+    /// One exact solve of the linearised constraints of threads of `n` vertices.
+    ///
+    /// `WARM`: the positions already carry the forces `lambda` of the step before, and the solve corrects both. Otherwise the
+    /// positions carry none and the whole force is found.
+    #[inline(always)]
+    pub(crate) fn solve<const WARM: bool>(&mut self, n: usize, springs: &Springs, work: &mut Work) {
         let Springs {
             rest,
             alpha,
@@ -86,10 +96,9 @@ impl Block {
             &mut self.z[..n],
             &self.w[..n],
         );
-        let (nx, ny, nz) = (&mut self.nx[..n], &mut self.ny[..n], &mut self.nz[..n]);
-        let (c, r) = (&mut self.c[..n], &mut self.r[..n]);
-        let before = &mut self.lambda[..n];
-        let [d0, d1, d2] = &self.d;
+        let (nx, ny, nz) = (&mut work.nx[..n], &mut work.ny[..n], &mut work.nz[..n]);
+        let (c, r) = (&mut work.c[..n], &mut work.r[..n]);
+        let (force, before) = (&mut self.lambda[..n], &self.before[..n]);
         // Directions, compliance and right-hand sides of all edges.
         for j in 0..n - 1 {
             for l in 0..LANES {
@@ -98,9 +107,9 @@ impl Block {
                     y[j + 1][l] - y[j][l],
                     z[j + 1][l] - z[j][l],
                 );
-                let l2 = (ax * ax + ay * ay + az * az).max(1e-24);
-                let inv = 1.0 / l2.sqrt();
-                let stretch = l2 * inv - rest;
+                let length = (ax * ax + ay * ay + az * az).max(1e-24).sqrt();
+                let inv = 1.0 / length;
+                let stretch = length - rest;
                 (nx[j][l], ny[j][l], nz[j][l]) = (ax * inv, ay * inv, az * inv);
                 // A stiffening thread: the secant compliance at the present stretch.
                 let soft = if stiffening > 0.0 {
@@ -109,14 +118,13 @@ impl Block {
                     alpha[l]
                 };
                 c[j][l] = soft;
-                r[j][l] = -stretch - soft * before[j][l];
-            }
-            if damping > 0.0 {
-                for l in 0..LANES {
-                    r[j][l] -= damping
-                        * (nx[j][l] * (d0[j + 1][l] - d0[j][l])
-                            + ny[j][l] * (d1[j + 1][l] - d1[j][l])
-                            + nz[j][l] * (d2[j + 1][l] - d2[j][l]));
+                r[j][l] = if WARM {
+                    -stretch - soft * force[j][l]
+                } else {
+                    -stretch
+                };
+                if damping > 0.0 {
+                    r[j][l] -= damping * (length - before[j][l]);
                 }
             }
         }
@@ -153,7 +161,9 @@ impl Block {
                 } else {
                     r[j][l]
                 };
-                before[j][l] += lambda[l];
+                if WARM {
+                    force[j][l] += lambda[l];
+                }
                 let (gx, gy, gz) = (
                     lambda[l] * nx[j][l],
                     lambda[l] * ny[j][l],
@@ -191,7 +201,9 @@ mod tests {
             block.w[j] = [if j == 0 { 0.0 } else { 1.0 / mass }; LANES];
             block.y[j] = [if j == 0 { 0.0 } else { want[j] - h * h * g }; LANES];
         }
-        block.solve(
+        let mut work = Work::default();
+        work.fit(n);
+        block.solve::<false>(
             n,
             &Springs {
                 rest,
@@ -199,6 +211,7 @@ mod tests {
                 damping: 0.0,
                 stiffening: 0.0,
             },
+            &mut work,
         );
         for j in 0..n {
             for l in 0..LANES {

@@ -77,6 +77,12 @@ enum Command {
         #[arg(long, default_value_t = 48)]
         segments: usize,
     },
+    /// Look through a cache for places where the cloth passes through itself, and for its largest strain
+    #[command(after_help = "Example:\n  woven-cloth check curtain.glb")]
+    Check {
+        /// A cache that `simulate` wrote as .glb
+        cache: PathBuf,
+    },
     /// List the built-in fabrics
     #[command(after_help = "Example:\n  woven-cloth fabrics")]
     Fabrics,
@@ -182,6 +188,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
             }
             Ok(())
         }
+        Command::Check { cache } => check(&cache),
         Command::Fabrics => {
             println!(
                 "{:<10} {:>6} {:>10} {:>10} {:>8} {:>8} {:>8}  about",
@@ -204,6 +211,36 @@ fn run(cli: Cli) -> anyhow::Result<()> {
             Ok(())
         }
     }
+}
+
+fn check(cache: &std::path::Path) -> anyhow::Result<()> {
+    let clip = CurtainClip::read(cache)?;
+    anyhow::ensure!(
+        !clip.mesh.indices.is_empty(),
+        "{} has no faces to look at; give a .glb",
+        cache.display()
+    );
+    let (mut sum, mut frames, mut worst, mut strain) = (0, 0, (0, 0), 0.0f32);
+    for (k, frame) in clip.frames.iter().enumerate() {
+        let found = woven_cloth::crossings(&frame.positions, &clip.mesh);
+        sum += found;
+        frames += usize::from(found > 0);
+        worst = worst.max((found, k));
+        for [warp, weft, _] in woven_cloth::weave_strain(&clip.mesh, &frame.positions) {
+            strain = strain.max(warp.abs()).max(weft.abs());
+        }
+    }
+    println!(
+        "{}: at rest {} crossings; in {} of {} frames {sum} (an edge through a triangle), most in frame {}: {}; largest strain at a vertex {:.2} %",
+        cache.display(),
+        woven_cloth::crossings(&clip.mesh.positions, &clip.mesh),
+        frames,
+        clip.frames.len(),
+        worst.1,
+        worst.0,
+        strain * 100.0
+    );
+    Ok(())
 }
 
 fn simulate_rest(spec: &CurtainSpec, output: &std::path::Path, json: bool) -> anyhow::Result<()> {

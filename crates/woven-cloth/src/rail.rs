@@ -105,7 +105,8 @@ impl Wave {
         for _ in 0..60 {
             let mid = 0.5 * (lo + hi);
             let e = span(mid);
-            if e[0].hypot(e[1]) > self.width {
+            // Steep pleats turned too far run backwards, which is too short, however far they get.
+            if e[0] > 0.0 && e[0].hypot(e[1]) > self.width {
                 lo = mid
             } else {
                 hi = mid

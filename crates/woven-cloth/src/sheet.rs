@@ -236,6 +236,15 @@ impl Sheet {
         self.mass.iter().sum()
     }
 
+    /// Whether every speed is below `most` m/s and every place nearer than `most` metres along each axis; NaN is not.
+    #[must_use]
+    pub fn is_within(&self, most: f64) -> bool {
+        // Whole numbers are counted, which the compiler does side by side; a search would stop at every vertex.
+        let within = |a: &Vec<f64>| a.iter().map(|c| i64::from(c.abs() < most)).sum::<i64>();
+        let all = self.len() as i64;
+        self.x.iter().chain(&self.v).all(|a| within(a) == all)
+    }
+
     /// False as soon as one number of the state is not finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {

@@ -3,12 +3,17 @@
 //! Time advances in ticks of 1/600 s, a whole number of which makes a frame at 24, 25, 30, 50, 60 or 100 a second, so the path
 //! does not depend on the frames asked for. Each tick is cut into as many steps as the fabric and the grid need.
 
+mod checkpoint;
+mod report;
+
+pub use report::Report;
+
 use crate::contact::SelfContact;
+use crate::draw::Draw;
 use crate::error::{Error, Result};
 use crate::fabrics::GRAVITY;
 use crate::mesh::{Mesh, normals, positions};
-use crate::random::fnv1a;
-use crate::sheet::{Energy, Sheet};
+use crate::sheet::Sheet;
 use crate::spec::CurtainSpec;
 use crate::step::{Stepper, stable_step};
 use crate::wind::{AirState, Drag, WIND_TICK, Wind, air_forces, sample};
@@ -16,7 +21,6 @@ use crate::wind::{AirState, Drag, WIND_TICK, Wind, air_forces, sample};
 /// Ticks a second.
 pub const TICKS: f64 = 600.0;
 const TICKS_PER_WIND: u64 = 10;
-const MAGIC: &[u8; 8] = b"WOVENCL2";
 
 /// One moment of the clip.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,27 +33,6 @@ pub struct Frame {
     pub velocities: Vec<[f32; 3]>,
 }
 
-/// What a curtain is doing, in numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report {
-    /// Time since the wind began, s.
-    pub time: f64,
-    /// Largest absolute strain of a thread segment now.
-    pub max_strain: f64,
-    /// Mean strain of the warp.
-    pub mean_strain: f64,
-    /// Force of the rail on the cloth, N.
-    pub support_force: [f64; 3],
-    /// Weight of the cloth, N.
-    pub weight: f64,
-    /// Energies, J.
-    pub energy: Energy,
-    /// Largest speed of a vertex, m/s.
-    pub max_speed: f64,
-    /// Steps a second of simulated time.
-    pub steps_per_second: f64,
-}
-
 /// A curtain being simulated.
 #[derive(Clone, Debug)]
 pub struct Simulation {
@@ -59,6 +42,7 @@ pub struct Simulation {
     wind: Wind,
     air: AirState,
     drag: Drag,
+    draw: Draw,
     substeps: u32,
     tick: u64,
     frame: u64,
@@ -76,13 +60,18 @@ impl Simulation {
         let (nx, ny) = (spec.columns, spec.rows);
         let mut sheet = Sheet::flat(nx, ny, spec.fabric_width(), spec.height, mechanics);
         sheet.add_hem(spec.hem);
-        let layout = spec.layout();
+        let draw = Draw::new(spec);
+        let layout = draw.layout(0.0);
         for j in 0..ny {
             let row = layout.row(nx, j as f64 / (ny - 1) as f64);
             for (i, p) in row.iter().enumerate() {
                 sheet.set_position(
                     j * nx + i,
-                    [p[0], spec.rail_height() - j as f64 * sheet.hy, p[1]],
+                    [
+                        p[0] + draw.middle(0.0),
+                        spec.rail_height() - j as f64 * sheet.hy,
+                        p[1],
+                    ],
                 );
             }
         }
@@ -105,24 +94,25 @@ impl Simulation {
         };
         let mut stepper = Stepper::new(&sheet, 1.0 / (TICKS * f64::from(substeps)), GRAVITY);
         stepper.obstacles = spec.obstacles.clone();
+        stepper.window = spec.window;
         if spec.self_contact {
-            // The grid's spacing is the least that keeps a vertex from slipping between the corners of a cell.
-            let distance = sheet.hx.max(sheet.hy).max(sheet.mechanics.thickness);
-            stepper.self_contact = Some(SelfContact::new(distance, spec.friction));
+            stepper.self_contact = Some(SelfContact::new(&sheet, spec.friction));
         }
-        let drag = Drag::new(&sheet.mechanics, spec.wind.tangential, spec.wind.speed);
+        let wind = Wind::new(&spec.wind, spec.seed);
+        let drag = Drag::new(&sheet.mechanics, spec.wind.tangential, wind.speed());
         let empty = || std::array::from_fn(|_| vec![0.0; (nx - 1) * (ny - 1)]);
         let air = AirState {
             now: empty(),
             next: empty(),
         };
         Ok(Self {
-            wind: Wind::new(&spec.wind, spec.seed),
+            wind,
             spec: spec.clone(),
             sheet,
             stepper,
             air,
             drag,
+            draw,
             substeps,
             tick: 0,
             frame: 0,
@@ -177,16 +167,25 @@ impl Simulation {
     /// One tick of 1/600 s; `s` is the place between two samples of the wind.
     fn advance_tick(&mut self, s: f64) -> Result<()> {
         air_forces(&self.sheet, &self.air, s, self.drag, &mut self.stepper.air);
-        for _ in 0..self.substeps {
+        for n in 0..self.substeps {
+            if self.settled {
+                let end = (f64::from(n) + 1.0) / f64::from(self.substeps);
+                self.draw.place(
+                    self.tick,
+                    end,
+                    &self.stepper.pins,
+                    &mut self.stepper.pin_places,
+                );
+            }
             self.stepper.step(&mut self.sheet);
         }
-        let fastest = self.max_speed();
         // A curtain in the strongest wind allowed stays under 60 m/s; NaN fails the comparison too.
-        if fastest.is_finite() && fastest < 200.0 && self.sheet.is_finite() {
+        if self.sheet.is_within(200.0) {
             return Ok(());
         }
-        let what = if fastest.is_finite() {
-            format!("a speed of {fastest:.0} m/s")
+        let fastest = self.max_speed();
+        let what = if fastest.is_finite() && self.sheet.is_finite() {
+            format!("a speed of {fastest:.0} m/s or a place as far away")
         } else {
             "a position that is not a number".to_owned()
         };
@@ -194,18 +193,6 @@ impl Simulation {
             time: self.time(),
             what,
         })
-    }
-
-    fn max_speed(&self) -> f64 {
-        let mut most = 0.0f64;
-        for k in 0..self.sheet.len() {
-            let v2: f64 = self.sheet.velocity(k).iter().map(|c| c * c).sum();
-            if v2.is_nan() {
-                return f64::NAN;
-            }
-            most = most.max(v2);
-        }
-        most.sqrt()
     }
 
     /// Time since the wind began, s.
@@ -294,109 +281,6 @@ impl Simulation {
     #[must_use]
     pub fn mesh(&self) -> Mesh {
         Mesh::from_sheet(&self.sheet)
-    }
-
-    /// Strain, force, energy and speed now.
-    #[must_use]
-    pub fn report(&self) -> Report {
-        Report {
-            time: self.time(),
-            max_strain: self.sheet.max_strain(),
-            mean_strain: self.sheet.mean_warp_strain(),
-            support_force: self.sheet.support_force(GRAVITY),
-            weight: self.sheet.total_mass() * GRAVITY,
-            energy: self.sheet.energy(GRAVITY),
-            max_speed: self.max_speed(),
-            steps_per_second: TICKS * f64::from(self.substeps),
-        }
-    }
-
-    /// A fingerprint of everything that decides the motion; the number of frames does not.
-    #[must_use]
-    pub fn fingerprint(spec: &CurtainSpec) -> u64 {
-        let spec = CurtainSpec {
-            frames: 1,
-            ..spec.clone()
-        };
-        fnv1a(toml::to_string(&spec).unwrap_or_default().as_bytes())
-    }
-
-    /// The whole state as bytes; `load` continues with the same bits.
-    #[must_use]
-    pub fn save(&self) -> Vec<u8> {
-        let mut out = Vec::new();
-        out.extend_from_slice(MAGIC);
-        for number in [
-            Self::fingerprint(&self.spec),
-            self.tick,
-            self.frame,
-            u64::from(self.settled),
-            u64::from(self.stepper.history),
-        ] {
-            out.extend_from_slice(&number.to_le_bytes());
-        }
-        for array in self.state() {
-            for value in array {
-                out.extend_from_slice(&value.to_le_bytes());
-            }
-        }
-        let sum = fnv1a(&out);
-        out.extend_from_slice(&sum.to_le_bytes());
-        out
-    }
-
-    fn state(&self) -> impl Iterator<Item = &Vec<f64>> {
-        let (s, t, a) = (&self.sheet, &self.stepper, &self.air);
-        s.x.iter()
-            .chain(&s.v)
-            .chain(&t.x_old)
-            .chain(&t.v_old)
-            .chain(&t.lambda)
-            .chain(&a.now)
-            .chain(&a.next)
-    }
-
-    /// A simulation that goes on where `save` was called.
-    ///
-    /// # Errors
-    /// When the bytes are damaged or belong to another curtain.
-    pub fn load(spec: &CurtainSpec, bytes: &[u8]) -> Result<Self> {
-        let mut sim = Self::new(spec)?;
-        let damaged =
-            || Error::Checkpoint("it is damaged or cut short; delete it to start anew".into());
-        let values: usize = sim.state().map(Vec::len).sum();
-        if bytes.len() != 8 + 5 * 8 + values * 8 + 8 || &bytes[..8] != MAGIC {
-            return Err(damaged());
-        }
-        let number =
-            |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight bytes"));
-        if fnv1a(&bytes[..bytes.len() - 8]) != number(bytes.len() - 8) {
-            return Err(damaged());
-        }
-        if number(8) != Self::fingerprint(spec) {
-            return Err(Error::Checkpoint(
-                "it was made for another curtain, wind or seed; delete it to start anew".into(),
-            ));
-        }
-        (sim.tick, sim.frame, sim.settled) = (number(16), number(24), number(32) != 0);
-        let mut at = 48;
-        let (s, t, a) = (&mut sim.sheet, &mut sim.stepper, &mut sim.air);
-        t.history = number(40) != 0;
-        for array in
-            s.x.iter_mut()
-                .chain(&mut s.v)
-                .chain(&mut t.x_old)
-                .chain(&mut t.v_old)
-                .chain(&mut t.lambda)
-                .chain(&mut a.now)
-                .chain(&mut a.next)
-        {
-            for value in array {
-                *value = f64::from_bits(number(at));
-                at += 8;
-            }
-        }
-        Ok(sim)
     }
 }
 

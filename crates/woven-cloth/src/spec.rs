@@ -1,10 +1,11 @@
 //! The description of a curtain: what a person writes in `CURTAIN.toml`, its defaults and its limits.
 
 use crate::contact::Obstacles;
+use crate::draw::{DrawKey, Side};
 use crate::error::{Error, Result};
 use crate::fabrics::{Mechanics, fabric};
 use crate::rail::{Heading, Pleats};
-use crate::wind::WindSpec;
+use crate::wind::{WindSpec, read_record};
 use serde::{Deserialize, Serialize};
 
 /// A curtain on a rail before a window. Lengths in m, times in s; y is up, the floor y = 0, the middle of the rail x = 0, the
@@ -46,6 +47,13 @@ pub struct CurtainSpec {
     pub wind: WindSpec,
     /// Floor, wall and sill.
     pub obstacles: Obstacles,
+    /// A hole in the obstacles' wall, `[left, right, bottom, top]` in m: the open window, through which the curtain may blow.
+    pub window: Option<[f64; 4]>,
+    /// Opening and closing: how far the curtain is drawn at which time. None leaves it closed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub draw: Vec<DrawKey>,
+    /// The side it is drawn to: `left`, `middle` or `right`.
+    pub draw_to: Side,
     /// Contact of the folds with each other.
     pub self_contact: bool,
     /// Coulomb friction of cloth on cloth.
@@ -81,6 +89,9 @@ impl Default for CurtainSpec {
             hem: 0.02,
             wind: WindSpec::default(),
             obstacles: Obstacles::default(),
+            window: None,
+            draw: Vec::new(),
+            draw_to: Side::Middle,
             self_contact: true,
             friction: 0.3,
             fps: 24.0,
@@ -98,8 +109,13 @@ impl std::str::FromStr for CurtainSpec {
 
     /// Reads TOML and checks every value.
     fn from_str(text: &str) -> Result<Self> {
-        let spec: Self =
-            toml::from_str(text).map_err(|e| Error::Toml(e.to_string().trim_end().to_owned()))?;
+        let spec = Self::parse(text)?;
+        if spec.wind.recorded.is_some() && spec.wind.samples.is_empty() {
+            return Err(Error::spec(
+                "wind.recorded",
+                "a text without a file has no folder to look for the record in; give `wind.samples`, or read the description from its file",
+            ));
+        }
         spec.validate()?;
         Ok(spec)
     }
@@ -111,9 +127,18 @@ impl CurtainSpec {
     /// # Errors
     /// When the file cannot be read, is not TOML, or a value is outside its limits.
     pub fn read(path: &std::path::Path) -> Result<Self> {
-        std::fs::read_to_string(path)
-            .map_err(|e| Error::io(path, e))?
-            .parse()
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
+        let mut spec = Self::parse(&text)?;
+        if let Some(name) = &spec.wind.recorded {
+            let folder = path.parent().unwrap_or(std::path::Path::new("."));
+            spec.wind.samples = read_record(&folder.join(name))?;
+        }
+        spec.validate()?;
+        Ok(spec)
+    }
+
+    fn parse(text: &str) -> Result<Self> {
+        toml::from_str(text).map_err(|e| Error::Toml(e.to_string().trim_end().to_owned()))
     }
 
     /// The mechanics in force: the named fabric's or those given.
@@ -188,6 +213,16 @@ impl CurtainSpec {
         if let Some(n) = self.substeps {
             range("substeps", f64::from(n), 1.0, 100.0, "")?;
         }
+        for (k, key) in self.draw.iter().enumerate() {
+            range("draw.time", key.time, 0.0, 1e5, "s")?;
+            range("draw.share", key.share, 0.1, 1.0, "")?;
+            if k > 0 && key.time <= self.draw[k - 1].time {
+                return Err(Error::spec(
+                    "draw.time",
+                    format!("{} s does not come after the key before", key.time),
+                ));
+            }
+        }
         if self.fullness > 1.0 {
             let per_pleat = (self.columns - 1) as f64 / f64::from(self.pleats);
             if per_pleat < 6.0 {
@@ -218,6 +253,15 @@ impl CurtainSpec {
                 "the direction has no length; write for example [0.0, 0.0, 1.0]",
             ));
         }
+        for (k, s) in w.samples.iter().enumerate() {
+            range("wind.samples", s[1], -20.0, 20.0, "m/s")?;
+            if !s[0].is_finite() || (k > 0 && s[0] <= w.samples[k - 1][0]) {
+                return Err(Error::spec(
+                    "wind.samples",
+                    format!("the time {} s does not come after the one before", s[0]),
+                ));
+            }
+        }
         if let Some(o) = w.opening {
             for (field, [lo, hi]) in [("wind.opening.x", o.x), ("wind.opening.y", o.y)] {
                 if !(lo.is_finite() && hi.is_finite() && lo < hi) {
@@ -236,6 +280,17 @@ impl CurtainSpec {
         for (field, value) in [("obstacles.floor", o.floor), ("obstacles.wall", o.wall)] {
             if let Some(v) = value {
                 range(field, v, -20.0, 20.0, "m")?;
+            }
+        }
+        if let Some([left, right, bottom, top]) = self.window {
+            for v in [left, right, bottom, top] {
+                range("window", v, -20.0, 20.0, "m")?;
+            }
+            if left >= right || bottom >= top {
+                return Err(Error::spec(
+                    "window",
+                    "[left, right, bottom, top] is no rectangle",
+                ));
             }
         }
         if let Some([height, z]) = o.sill {

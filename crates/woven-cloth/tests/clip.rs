@@ -208,3 +208,104 @@ fn six_hundred_frames_of_gusts_stay_whole() {
     assert!(strain < 0.05, "largest strain {strain}");
     assert!(reach > 0.2, "the wind must move it: {reach} m");
 }
+
+/// A curtain large enough to be shared out over threads, folds in contact, rings on their way.
+fn busy() -> CurtainSpec {
+    "width = 0.7\nheight = 0.9\npleats = 7\ncolumns = 71\nrows = 45\nsettle = 0.3\nwarm_up = 0.0\nfps = 24.0\n[wind]\nspeed = 2.0\n[[draw]]\ntime = 0.0\nshare = 0.5\n[[draw]]\ntime = 2.0\nshare = 0.3"
+        .parse()
+        .unwrap()
+}
+
+#[test]
+fn one_two_and_four_threads_give_the_same_bits_and_so_does_going_on_from_any_frame() {
+    let frames = 5;
+    let run = |threads: usize| -> Vec<Vec<u8>> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| {
+            let mut sim = Simulation::new(&busy()).unwrap();
+            sim.settle(0.3).unwrap();
+            (0..frames)
+                .map(|_| {
+                    sim.step_frame().unwrap();
+                    sim.save()
+                })
+                .collect()
+        })
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(4), "bits differ over threads");
+    for (k, state) in one.iter().enumerate() {
+        let mut sim = Simulation::load(&busy(), state).unwrap();
+        for after in &one[k + 1..] {
+            sim.step_frame().unwrap();
+            assert!(
+                sim.save() == *after,
+                "bits differ after going on from frame {k}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_curtain_drawn_to_a_fifth_of_its_rail_stays_whole() {
+    let text = "width = 1.0\nheight = 1.2\nfullness = 2.0\npleats = 8\ncolumns = 65\nrows = 33\nsettle = 1.0\nwarm_up = 0.0\nfps = 24.0\nfabric = \"voile\"\ndraw_to = \"left\"\n[[draw]]\ntime = 0.0\nshare = 1.0\n[[draw]]\ntime = 2.0\nshare = 0.2";
+    let mut sim = Simulation::new(&text.parse().unwrap()).unwrap();
+    let (mut through, mut strain) = (0, 0.0f64);
+    for _ in 0..72 {
+        sim.step_frame().unwrap();
+        through += woven_cloth::crossings(&sim.frame().positions, &sim.mesh());
+        strain = strain.max(sim.report().max_strain);
+    }
+    let s = sim.sheet();
+    let heading = s.x[0][64] - s.x[0][0];
+    println!(
+        "drawn to {heading:.3} m: {through} crossings in 72 frames, largest strain {:.2} %",
+        strain * 100.0
+    );
+    assert!((heading - 0.2).abs() < 1e-9 && (s.x[0][0] + 0.5).abs() < 1e-9);
+    assert!(strain < 0.1, "{strain}");
+}
+
+#[test]
+fn the_strain_of_the_weave_is_in_the_glb() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.glb");
+    let clip = simulate(
+        &CurtainSpec {
+            frames: 2,
+            ..spec()
+        },
+        &mut go,
+    )
+    .unwrap();
+    clip.write(&path).unwrap();
+    let document = gltf::Gltf::open(&path).unwrap();
+    let primitive = document
+        .meshes()
+        .next()
+        .unwrap()
+        .primitives()
+        .next()
+        .unwrap();
+    let accessor = primitive
+        .get(&gltf::Semantic::Extras("WOVEN_STRETCH".into()))
+        .expect("the attribute is there");
+    let view = accessor.view().unwrap();
+    let (from, step) = (view.offset(), view.stride().unwrap());
+    let blob = document.blob.as_deref().unwrap();
+    for (k, want) in woven_cloth::weave_strain(&clip.mesh, &clip.mesh.positions)
+        .iter()
+        .enumerate()
+    {
+        for c in 0..3 {
+            let at = from + k * step + 2 * c;
+            let got = f32::from(i16::from_le_bytes([blob[at], blob[at + 1]])) / 32767.0;
+            // Half a step of 16 bits.
+            assert!(
+                (got - want[c]).abs() < 1.6e-5,
+                "vertex {k}: {got} for {}",
+                want[c]
+            );
+        }
+    }
+}

@@ -12,6 +12,8 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use woven_bsdf::measured::csv::Scan;
 use woven_bsdf::measured::klems::{Block, Kind, Klems};
+use woven_bsdf::measured::pab::Pab;
+use woven_bsdf::measured::tensor_tree::TensorTree;
 use woven_bsdf::vec3::Vec3;
 
 /// One pair of directions inside a kernel, with its share of the average.
@@ -107,7 +109,7 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Reads a Klems XML (`.xml`) or a scan (`.csv`).
+    /// Reads a Klems matrix or a tensor tree (`.xml`), a scan (`.csv`) or PAB text (`.pab`, `.txt`, `.dat`).
     ///
     /// # Errors
     /// A sentence that names the file and what to do.
@@ -128,7 +130,13 @@ impl Measurement {
             .unwrap_or_default();
         let (source, name, maker) = match extension.as_str() {
             "xml" => {
-                let klems = Klems::read(path)?;
+                let text = String::from_utf8_lossy(&bytes);
+                // Tensor trees share the ending; they are averaged over Klems' patches.
+                let klems = if text.contains("TensorTree") {
+                    TensorTree::read(path)?.to_klems()
+                } else {
+                    Klems::read(path)?
+                };
                 let name = if klems.name.is_empty() {
                     stem
                 } else {
@@ -138,8 +146,9 @@ impl Measurement {
                 (Source::Klems(klems), name, maker)
             }
             "csv" => (Source::Scan(Scan::read(path)?), stem, String::new()),
+            "pab" | "txt" | "dat" => (Source::Scan(Pab::read(path)?.scan()), stem, String::new()),
             other => bail!(
-                "{}: the ending {other:?} is unknown; measurements are .xml (Klems) or .csv (theta_l_deg,…)",
+                "{}: the ending {other:?} is unknown; measurements are .xml (Klems or tensor tree), .csv (theta_l_deg,…) or .pab (PAB text)",
                 path.display()
             ),
         };

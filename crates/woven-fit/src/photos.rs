@@ -173,6 +173,14 @@ impl Photo {
     }
 }
 
+/// The reflectance of a common fibre's surface, which the fits hold.
+const USUAL_F0: f64 = 0.04;
+
+/// Cosine-weighted mean of Schlick's reflectance.
+fn mean_schlick(f0: f64) -> f64 {
+    f0 + (1.0 - f0) / 21.0
+}
+
 /// What two photos say of a sheet.
 #[derive(Clone, Debug)]
 pub struct PhotoFit {
@@ -241,6 +249,12 @@ impl PhotoFit {
         both.find(|p| p.name == name).map_or(0.0, |p| p.value)
     }
 
+    /// Relative light that comes back evenly and from the lobe, whose reflectance counts with its mean.
+    pub fn reflected_light(&self) -> (f64, f64) {
+        let lobe = self.value("k_r") * mean_schlick(USUAL_F0);
+        (self.value("r_d"), lobe)
+    }
+
     /// What a pair of photos cannot tell, in sentences.
     pub fn cannot_tell(&self) -> Vec<String> {
         let mut list = vec![
@@ -251,7 +265,7 @@ impl PhotoFit {
                 "Beyond {:.0}° from straight through nothing was seen.",
                 self.reach_deg
             ),
-            "The reflectance at grazing angles: f0 keeps the value of a common fibre.".to_owned(),
+            "f0 apart from k_r: away from grazing angles only their product counts; the fit holds f0 at 0.04, a common fibre's.".to_owned(),
         ];
         for (fit, what) in [
             (&self.transmission, "transmission"),
@@ -268,15 +282,24 @@ impl PhotoFit {
     pub fn fabric(&self, name: &str, transmitted: f64, reflected: f64, command: &str) -> Fabric {
         let sheet = model::find("sheet").expect("in the list");
         let through = self.value("t_d") + self.value("k_t");
-        let back = self.value("r_d") + self.value("k_r");
+        let (r_d, lobe) = self.reflected_light();
+        let share = reflected / (r_d + lobe).max(f64::MIN_POSITIVE);
+        let (r_d, lobe) = (r_d * share, lobe * share);
+        // The yarn's factors sum to 1 at most. A photo sees k_r and f0 as a product, so where the lobe needs more than what
+        // is left, f0 rises instead.
+        let left = (1.0 - transmitted - r_d).max(f64::MIN_POSITIVE);
+        let f0 = ((lobe / left - 1.0 / 21.0) * 21.0 / 20.0).clamp(USUAL_F0, 1.0);
+        let k_r = (lobe / mean_schlick(f0)).min(left * (1.0 - 1e-12));
         let mut parameters: BTreeMap<String, f64> = BTreeMap::new();
         for (p, &value) in sheet.params.iter().zip(&self.reflection.values) {
-            let scale = match p.name {
-                "t_d" | "k_t" => transmitted / through.max(f64::MIN_POSITIVE),
-                "r_d" | "k_r" => reflected / back.max(f64::MIN_POSITIVE),
-                _ => 1.0,
+            let value = match p.name {
+                "t_d" | "k_t" => value * transmitted / through.max(f64::MIN_POSITIVE),
+                "r_d" => r_d,
+                "k_r" => k_r,
+                "f0" => f0,
+                _ => value,
             };
-            parameters.insert(p.name.to_owned(), (value * scale).clamp(p.min, p.max));
+            parameters.insert(p.name.to_owned(), value.clamp(p.min, p.max));
         }
         let remark = format!(
             "from photographs: the shares {transmitted} transmitted and {reflected} reflected were assumed, and the gap was taken as closed"

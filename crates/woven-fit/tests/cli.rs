@@ -142,6 +142,37 @@ fn info_tells_peak_skirt_and_floor_of_the_goniometer_file() {
 }
 
 #[test]
+fn pab_text_is_read_like_the_scan_it_came_from() {
+    let dir = tempfile::tempdir().unwrap();
+    let ward = woven_bsdf::model::find("ward").unwrap();
+    let scan = woven_fit::synth::scan_of(ward, &[0.2, 0.3, 0.2, 0.35], &[20.0], 0.0, 0);
+    let pab = woven_bsdf::measured::pab::Pab::from_scan("ward", &scan);
+    assert_eq!(pab.len(), 1, "one incidence, one file");
+    let path = dir.path().join("ward.pab");
+    std::fs::write(&path, pab[0].to_text()).unwrap();
+    let data = woven_fit::measurement::Measurement::read(&path).unwrap();
+    let points = data.points(true, woven_fit::measurement::Detail::Full, false);
+    assert_eq!(points.points.len(), scan.samples.len());
+    let output = run(&[
+        "fit",
+        path.to_str().unwrap(),
+        "--model",
+        "ward",
+        "--out",
+        dir.path().to_str().unwrap(),
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    let text = std::fs::read_to_string(dir.path().join("fit.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let alpha = json["ranking"][0]["parameters"].as_array().unwrap().iter();
+    let alpha = alpha
+        .filter(|p| p["name"] == "a_x")
+        .map(|p| p["value"].as_f64().unwrap());
+    // The text holds six digits or so.
+    assert!(alpha.clone().count() == 1 && alpha.into_iter().all(|a| (a - 0.2).abs() < 1e-3));
+}
+
+#[test]
 fn convert_to_csv_and_fit_that() {
     let dir = tempfile::tempdir().unwrap();
     let csv = dir.path().join("shade.csv");

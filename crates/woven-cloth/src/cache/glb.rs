@@ -5,10 +5,14 @@ use crate::clip::CurtainClip;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::simulation::Frame;
+use crate::weave::weave_strain;
 use serde_json::{Value, json};
 
 const F32: u32 = 5126;
 const U32: u32 = 5125;
+const I16: u32 = 5122;
+/// The attribute with the strain of the weave.
+const STRAIN: &str = "_WOVEN_STRETCH";
 
 /// Binary chunk and the lists of views and accessors that describe it.
 #[derive(Default)]
@@ -55,6 +59,38 @@ impl Chunk {
         self.vectors(&values, "SCALAR", None)
     }
 
+    /// Numbers of -1 to 1 as normalised 16-bit integers, each vertex padded to eight bytes as the format asks.
+    fn shorts(&mut self, values: &[[f32; 3]], base: &[[f32; 3]]) -> usize {
+        let word = |v: f32| (v.clamp(-1.0, 1.0) * 32767.0).round() as i16;
+        let words: Vec<[i16; 4]> = values
+            .iter()
+            .enumerate()
+            .map(|(k, v)| {
+                let from = base.get(k).copied().unwrap_or_default();
+                let [a, b, c] = std::array::from_fn(|c| word(v[c]).saturating_sub(word(from[c])));
+                [a, b, c, 0]
+            })
+            .collect();
+        let bytes = words
+            .iter()
+            .flat_map(|[a, b, c, d]| [[*a, *b], [*c, *d]])
+            .map(|[a, b]| {
+                let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
+                [a[0], a[1], b[0], b[1]]
+            });
+        let view = self.view(bytes, Some(34962));
+        self.views[view]["byteStride"] = 8.into();
+        let (mut min, mut max) = ([i16::MAX; 3], [i16::MIN; 3]);
+        for w in &words {
+            for c in 0..3 {
+                min[c] = min[c].min(w[c]);
+                max[c] = max[c].max(w[c]);
+            }
+        }
+        self.accessors.push(json!({ "bufferView": view, "componentType": I16, "normalized": true, "count": values.len(), "type": "VEC3", "min": min, "max": max }));
+        self.accessors.len() - 1
+    }
+
     fn indices(&mut self, values: &[u32]) -> usize {
         let view = self.view(values.iter().map(|v| v.to_le_bytes()), Some(34963));
         let max = values.iter().max().copied().unwrap_or(0);
@@ -94,6 +130,10 @@ pub(crate) fn encode(clip: &CurtainClip) -> Result<Vec<u8>> {
     let uv = chunk.vectors(&mesh.uvs, "VEC2", vertex);
     let index = chunk.indices(&mesh.indices);
     let mut primitive = json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv }, "indices": index, "mode": 4, "material": 0 });
+    let strain = weave_strain(mesh, &mesh.positions);
+    if !strain.is_empty() {
+        primitive["attributes"][STRAIN] = chunk.shorts(&strain, &[]).into();
+    }
     let extras = json!({
         "woven": { "fabric_size": mesh.fabric_size, "grid": mesh.grid, "fps": clip.fps, "frames": n },
         "targetNames": (0..n).map(|k| format!("frame_{k:04}")).collect::<Vec<_>>(),
@@ -113,7 +153,12 @@ pub(crate) fn encode(clip: &CurtainClip) -> Result<Vec<u8>> {
             .map(|f| {
                 let p = chunk.vectors(&differences(&f.positions, &mesh.positions), "VEC3", vertex);
                 let n = chunk.vectors(&differences(&f.normals, &mesh.normals), "VEC3", vertex);
-                json!({ "POSITION": p, "NORMAL": n })
+                let mut target = json!({ "POSITION": p, "NORMAL": n });
+                if !strain.is_empty() {
+                    let now = weave_strain(mesh, &f.positions);
+                    target[STRAIN] = chunk.shorts(&now, &strain).into();
+                }
+                target
             })
             .collect();
         primitive["targets"] = targets.into();

@@ -11,7 +11,7 @@ use woven_fit::{figures, report, text};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Measurements: Klems XML (.xml) or scattered points (.csv).
+    /// Measurements: Klems matrix or tensor tree (.xml), scattered points (.csv) or PAB text (.pab, .txt, .dat).
     #[arg(required = true)]
     data: Vec<PathBuf>,
     #[command(flatten)]

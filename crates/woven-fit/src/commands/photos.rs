@@ -98,13 +98,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
         ..Options::default()
     };
     let found = fit(&reflection, &transmission, &setup, &options)?;
-    let ratio = |a: &str, b: &str| {
-        let (a, b) = (found.value(a), found.value(b));
-        format!(
-            "{:.1} % of the two",
-            100.0 * b / (a + b).max(f64::MIN_POSITIVE)
-        )
-    };
+    let share = |rest: f64, lobe: f64| 100.0 * lobe / (rest + lobe).max(f64::MIN_POSITIVE);
+    let (even, shine) = found.reflected_light();
     let mut s = String::from("factors are relative, apart for each photo\n");
     for fit in [&found.transmission, &found.reflection] {
         s += &text::parameters(fit);
@@ -115,9 +110,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
         );
     }
     s += &format!(
-        "forward lobe k_t: {}; reflected lobe k_r: {}\n",
-        ratio("t_d", "k_t"),
-        ratio("r_d", "k_r")
+        "the forward lobe has {:.1} % of the transmitted light, the reflected lobe {:.1} % of the reflected\n",
+        share(found.value("t_d"), found.value("k_t")),
+        share(even, shine)
     );
     for line in found.cannot_tell() {
         s += &format!("cannot tell: {line}\n");

@@ -8,7 +8,7 @@ use woven_fit::convert::write_atomically;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Measurements: Klems XML (.xml) or scattered points (.csv).
+    /// Measurements: Klems matrix or tensor tree (.xml), scattered points (.csv) or PAB text (.pab, .txt, .dat).
     #[arg(required = true)]
     data: Vec<PathBuf>,
     #[command(flatten)]

@@ -6,6 +6,9 @@
 //! vertex that slipped through within a step is so brought back instead of being held on the wrong side. Between folds lies a soft
 //! cushion of nearly the grid's spacing, so that they part before their edges can cross, and a thin hard core; stacked pleats press
 //! the cushion together.
+//!
+//! It is no proof that no triangle ever crosses another. Measured with `woven-cloth check`: none while a curtain is drawn to a fifth of
+//! its rail; in gusts of 3 m/s on 65 × 64 vertices 189 pierced triangles in 51 of 240 frames, 8 at most at once.
 
 use super::sort_into_cells;
 use crate::sheet::{Field, Sheet};

@@ -3,9 +3,11 @@
 
 mod buffers;
 mod device;
+mod kernel;
 mod pipeline;
 
 pub use device::{Adapter, adapters};
+pub use kernel::Kernel;
 pub use pipeline::source;
 
 use anyhow::{Result, bail, ensure};

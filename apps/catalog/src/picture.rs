@@ -229,7 +229,7 @@ impl Set {
 
 /// Stronger than the filter's own: pixels share paths, so that their noise is alike over a few pixels, and a film shows what flickers.
 const FILTER: Filter = Filter {
-    radius: 9,
+    radius: 8,
     strength: 1.2,
     albedo: 0.06,
     normal: 0.25,

@@ -68,8 +68,9 @@ impl SelfContact {
         let spacing = sheet.hx.min(sheet.hy);
         Self {
             gap: (CUSHION * spacing).max(sheet.mechanics.thickness),
-            // Half the diagonal of a cell and a little more for a stretched one.
-            radius: 0.53 * sheet.hx.hypot(sheet.hy),
+            // Half the diagonal of a cell and a little more for a stretched one. On a mesh of long cells discs would reach over
+            // many vertices (the cost grows with the square of that): there they leave holes instead.
+            radius: (0.53 * sheet.hx.hypot(sheet.hy)).min(1.2 * spacing),
             friction,
             margin: 0.5 * spacing,
             pairs: Vec::new(),

@@ -1,19 +1,7 @@
 //! The Klems full basis: 145 patches of a hemisphere (Klems 1994; the LBNL WINDOW program).
 
 use std::f64::consts::PI;
-
-/// Bounds of the rings in polar angle, degrees, and the number of patches in each.
-pub const RINGS: [(f64, f64, u32); 9] = [
-    (0.0, 5.0, 1),
-    (5.0, 15.0, 8),
-    (15.0, 25.0, 16),
-    (25.0, 35.0, 20),
-    (35.0, 45.0, 24),
-    (45.0, 55.0, 24),
-    (55.0, 65.0, 24),
-    (65.0, 75.0, 16),
-    (75.0, 90.0, 12),
-];
+use woven_bsdf::measured::klems_write::RINGS;
 
 /// One patch.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,9 +9,7 @@ use ogm_driver::plan::Plan;
 use ogm_driver::rig::Rig;
 use ogm_driver::scan::{self, Quiet};
 use ogm_driver::serial::SerialTransport;
-use ogm_driver::sim::Sample;
 use ogm_driver::sim::camera::CameraServer;
-use ogm_driver::sim::optics::PlainCloth;
 use ogm_driver::transport::StopToken;
 
 #[test]
@@ -61,15 +59,5 @@ fn a_camera_behind_a_command_measures_the_cloth() {
             .clone()
             .any(|r| r.shots.iter().any(|s| s.exposure_ms == 1024.0))
     );
-    for s in &merge_log(&log).unwrap().samples {
-        let truth = PlainCloth.bsdf(s.pose.light(), s.pose.view());
-        // As over the photodiode: a blur of 0.1 % by the aperture, five standard errors.
-        assert!(
-            (s.f - truth).abs() < 0.001 * truth + 5.0 * s.sigma,
-            "{}: {} +- {} for {truth}",
-            s.pose,
-            s.f,
-            s.sigma
-        );
-    }
+    common::check_plain_cloth(&merge_log(&log).unwrap());
 }

@@ -1,5 +1,7 @@
 //! The whole path over a real pseudo-terminal with the real serialport crate: scan, log, resume, merge.
 
+mod common;
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -10,7 +12,7 @@ use ogm_driver::plan::Plan;
 use ogm_driver::rig::Rig;
 use ogm_driver::scan::{self, Outcome, Quiet};
 use ogm_driver::serial::SerialTransport;
-use ogm_driver::sim::optics::{PlainCloth, Sample};
+use ogm_driver::sim::optics::PlainCloth;
 use ogm_driver::sim::{Bench, Device, FaultPlan, Imperfections, PtyRig};
 use ogm_driver::transport::StopToken;
 
@@ -41,17 +43,7 @@ fn paper() -> Plan {
 fn check_cloth(log: &Path) {
     let m = merge_log(log).unwrap();
     assert_eq!((m.samples.len(), m.direct.len()), (78, 1));
-    for s in &m.samples {
-        // The aperture of one degree blurs a 12° Gaussian by under 0.1 %; five standard errors beside it.
-        let truth = PlainCloth.bsdf(s.pose.light(), s.pose.view());
-        assert!(
-            (s.f - truth).abs() < 0.001 * truth + 5.0 * s.sigma,
-            "{}: {} +- {} for {truth}",
-            s.pose,
-            s.f,
-            s.sigma
-        );
-    }
+    common::check_plain_cloth(&m);
     let t = m.direct[0];
     assert!(
         (t.transmittance - 0.05).abs() < 5.0 * t.sigma + 1e-4,

@@ -6,6 +6,7 @@
 //! ties are all there is.
 
 use crate::fit::FitResult;
+use crate::rank::place_or_tie;
 use crate::starts::hash;
 use serde::Serialize;
 use std::fmt::Write;
@@ -122,12 +123,7 @@ impl Comparison {
         s.push('\n');
         let mut last = 0;
         for row in &self.rows {
-            let place = if row.place == last {
-                "=".to_owned()
-            } else {
-                row.place.to_string()
-            };
-            last = row.place;
+            let place = place_or_tie(row.place, &mut last);
             write!(
                 s,
                 "{place:>5}  {:<34} {:>10.2} {:>6} {:>9.3}  ",

@@ -1,5 +1,7 @@
 //! Quantiles of Student's distribution, by the incomplete beta function.
 
+use libm::lgamma;
+
 /// Two-sided Student quantile: half-width of the interval of coverage `level`, in standard errors.
 pub fn student(level: f64, dof: usize) -> f64 {
     if dof == 0 {
@@ -39,8 +41,7 @@ pub fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x > (a + 1.0) / (a + b + 2.0) {
         return 1.0 - incomplete_beta(1.0 - x, b, a);
     }
-    let front =
-        (a * x.ln() + b * (1.0 - x).ln() + ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b)).exp() / a;
+    let front = (a * x.ln() + b * (1.0 - x).ln() + lgamma(a + b) - lgamma(a) - lgamma(b)).exp() / a;
     let guard = |v: f64| if v.abs() < 1e-300 { 1e-300 } else { v };
     let (mut c, mut d) = (1.0, 1.0 / guard(1.0 - (a + b) * x / (a + 1.0)));
     let mut f = d;
@@ -58,33 +59,6 @@ pub fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
         }
     }
     front * f
-}
-
-/// Logarithm of the gamma function for positive arguments (Lanczos, g = 7, n = 9).
-fn ln_gamma(x: f64) -> f64 {
-    const C: [f64; 9] = [
-        0.999_999_999_999_809_9,
-        676.520_368_121_885_1,
-        -1_259.139_216_722_402_8,
-        771.323_428_777_653_1,
-        -176.615_029_162_140_6,
-        12.507_343_278_686_905,
-        -0.138_571_095_265_720_12,
-        9.984_369_578_019_572e-6,
-        1.505_632_735_149_311_6e-7,
-    ];
-    if x < 0.5 {
-        return (std::f64::consts::PI / (std::f64::consts::PI * x).sin()).ln() - ln_gamma(1.0 - x);
-    }
-    let x = x - 1.0;
-    let t = x + 7.5;
-    let sum: f64 = C[1..]
-        .iter()
-        .enumerate()
-        .map(|(i, c)| c / (x + i as f64 + 1.0))
-        .sum::<f64>()
-        + C[0];
-    0.5 * std::f64::consts::TAU.ln() + (x + 0.5) * t.ln() - t + sum.ln()
 }
 
 #[cfg(test)]

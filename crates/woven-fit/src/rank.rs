@@ -8,6 +8,15 @@ use crate::starts::hash;
 /// Samples of the bootstrap that judges the order.
 const BOOTSTRAP: u64 = 400;
 
+/// A place as a table says it: "=" behind one like the `last`.
+pub(crate) fn place_or_tie(place: usize, last: &mut usize) -> String {
+    if std::mem::replace(last, place) == place {
+        "=".to_owned()
+    } else {
+        place.to_string()
+    }
+}
+
 /// Fills the scores of a fit that do not depend on the others.
 pub fn score(fit: &mut ModelFit, points: &Points, metric: Metric, floor: f64) {
     let scattered = || {

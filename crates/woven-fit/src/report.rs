@@ -3,6 +3,7 @@
 use crate::figures::{gap_chart, polar_plot, residual_chart, shown, slice_chart, slices};
 use crate::fit::{FitResult, ModelFit};
 use crate::plot::{Scale, correlations, escape};
+use crate::rank::place_or_tie;
 use crate::text;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -213,12 +214,7 @@ fn ranking(s: &mut String, result: &FitResult) {
     .expect(ok);
     let mut last = 0;
     for fit in &result.ranking {
-        let place = if fit.place == last {
-            "=".to_owned()
-        } else {
-            fit.place.to_string()
-        };
-        last = fit.place;
+        let place = place_or_tie(fit.place, &mut last);
         writeln!(
             s,
             "<tr{}><td>{place}<td class='l'>{}<td>{}<td>{:.0}<td>{:.1}<td>{:.1}<td>{:.1}<td>{:.1}<td>{:.1}<td>{}<td>{:.0} %<td class='l'>{}</tr>",

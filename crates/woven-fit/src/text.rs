@@ -1,6 +1,7 @@
 //! Numbers as people read them, and the ranking as a table for a terminal.
 
 use crate::fit::{FitResult, ModelFit, Parameter};
+use crate::rank::place_or_tie;
 use std::fmt::Write;
 
 /// A number with four significant digits, without a needless exponent.
@@ -59,12 +60,10 @@ pub fn ranking(result: &FitResult) -> String {
     .expect(ok);
     let mut last = 0;
     for fit in &result.ranking {
-        let tie = fit.place == last;
-        last = fit.place;
         writeln!(
             s,
             "{:>5}  {:<34} {:>2} {:>9.0} {:>10.1} {:>8.1} {:>8.1} {:>11.1} {:>11.1} {:>8} {:>5.0}%{}",
-            if tie { "=".to_owned() } else { fit.place.to_string() },
+            place_or_tie(fit.place, &mut last),
             fit.label,
             fit.uncertainty.rank,
             fit.misfit,

@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use super::Measurement;
 use super::export::{beside, write_whole};
 use crate::error::{Error, Result};
-use crate::klems::{Patch, RINGS, centre, patches};
+use crate::klems::{Patch, centre, patches};
+use woven_bsdf::measured::klems_write::RINGS;
 
 /// A direction as whole numbers.
 type Key = (i64, i64);

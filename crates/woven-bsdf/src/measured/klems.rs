@@ -5,7 +5,7 @@
 //! is the straight-through one: in the cloth's frame (seen from the front) l = (-sinθ cosφ, -sinθ sinφ, cosθ) and the
 //! transmitted v = (sinθ cosφ, sinθ sinφ, -cosθ), the mirror-reflected v = (sinθ cosφ, sinθ sinφ, cosθ).
 
-use super::xml::{find, is, number, text};
+use super::xml::{document, find, is, number, text};
 use super::{Refused, klems_check, read_text, tensor_tree};
 use crate::angles::radians;
 use crate::vec3::Vec3;
@@ -155,11 +155,7 @@ impl Klems {
     /// # Errors
     /// As [`Klems::read`].
     pub fn parse(xml: &str) -> Result<Self, Refused> {
-        let doc = roxmltree::Document::parse(xml).map_err(|e| {
-            Refused::new(format!(
-                "the XML is broken or cut off ({e}); fetch the file again"
-            ))
-        })?;
+        let doc = document(xml)?;
         let root = doc.root_element();
         match text(root, "IncidentDataStructure") {
             "Columns" => {}

@@ -88,19 +88,21 @@ fn escape(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
+/// The nine rings of LBNL's full basis: bounds in polar angle, degrees, and the number of patches in each (Klems 1994).
+pub const RINGS: [(f64, f64, u32); 9] = [
+    (0.0, 5.0, 1),
+    (5.0, 15.0, 8),
+    (15.0, 25.0, 16),
+    (25.0, 35.0, 20),
+    (35.0, 45.0, 24),
+    (45.0, 55.0, 24),
+    (55.0, 65.0, 24),
+    (65.0, 75.0, 16),
+    (75.0, 90.0, 12),
+];
+
 /// The patches of LBNL's full basis: 145 in nine rings.
 pub fn klems_full() -> Vec<Patch> {
-    const RINGS: [(f64, f64, usize); 9] = [
-        (0.0, 5.0, 1),
-        (5.0, 15.0, 8),
-        (15.0, 25.0, 16),
-        (25.0, 35.0, 20),
-        (35.0, 45.0, 24),
-        (45.0, 55.0, 24),
-        (55.0, 65.0, 24),
-        (65.0, 75.0, 16),
-        (75.0, 90.0, 12),
-    ];
     let turn = std::f64::consts::TAU;
     RINGS
         .iter()
@@ -108,8 +110,8 @@ pub fn klems_full() -> Vec<Patch> {
             (0..n).map(move |k| Patch {
                 theta_lo: radians(lo),
                 theta_hi: radians(hi),
-                phi: turn * k as f64 / n as f64,
-                phi_width: turn / n as f64,
+                phi: turn * f64::from(k) / f64::from(n),
+                phi_width: turn / f64::from(n),
             })
         })
         .collect()

@@ -7,7 +7,7 @@
 //! that equal areas are equal projected solid angles. Sides and azimuths are those of [`super::klems`].
 
 use super::klems::{Kind, Klems, data_blocks};
-use super::xml::{find, text};
+use super::xml::{document, find, text};
 use super::{Refused, read_text, resample};
 use crate::vec3::Vec3;
 use roxmltree::Node;
@@ -73,11 +73,7 @@ impl TensorTree {
     /// # Errors
     /// As [`TensorTree::read`].
     pub fn parse(xml: &str) -> Result<Self, Refused> {
-        let doc = roxmltree::Document::parse(xml).map_err(|e| {
-            Refused::new(format!(
-                "the XML is broken or cut off ({e}); fetch the file again"
-            ))
-        })?;
+        let doc = document(xml)?;
         Self::of_root(doc.root_element())
     }
 

@@ -1,7 +1,16 @@
 //! What the readers of BSDF XML share: elements by their local names, numbers, texts.
 
 use super::Refused;
-use roxmltree::Node;
+use roxmltree::{Document, Node};
+
+/// The text of a file as a document.
+pub(super) fn document(xml: &str) -> Result<Document<'_>, Refused> {
+    Document::parse(xml).map_err(|e| {
+        Refused::new(format!(
+            "the XML is broken or cut off ({e}); fetch the file again"
+        ))
+    })
+}
 
 /// `has_tag_name` without the namespace, which files spell in several ways.
 pub(super) fn is(node: Node<'_, '_>, name: &str) -> bool {

@@ -1,7 +1,7 @@
 //! Random fault scripts on virtual time: every one ends in a sentence within the deadlines or in a complete scan; no point at an unverified pose,
 //! no move sent twice, and afterwards a healthy session completes the same log.
 //!
-//! `OGM_FAULT_SCRIPTS` sets the number of scripts (the suite runs 120).
+//! `OGM_FAULT_SCRIPTS` sets the number of scripts (the suite runs 120); `OGM_SCRIPT=n` runs script n alone and prints its conversation.
 
 mod common;
 
@@ -85,7 +85,6 @@ fn check_journal(rig: &Rig, journal: &[WireLine], end: f64, script: u64) {
     let sent: Vec<&WireLine> = journal.iter().filter(|l| l.to_rig).collect();
     for pair in sent.windows(2) {
         let gap = pair[1].at - pair[0].at;
-        // A jump of the simulation's clock by an hour is not a wait.
         // A jump of the simulation's clock by an hour (or two jumps) is not a wait.
         let gap = gap - 3600.0 * ((gap + 1.0) / 3600.0).floor();
         assert!(
@@ -160,7 +159,7 @@ fn check_poses(device: &Arc<Mutex<Device>>, new: &[Reading], script: u64) {
     }
 }
 
-fn run_script(script: u64, folder: &Path) -> (bool, String) {
+fn run_script(script: u64, folder: &Path, show: bool) -> (bool, String) {
     let mut rig = if script.is_multiple_of(2) {
         Rig::default()
     } else {
@@ -176,9 +175,24 @@ fn run_script(script: u64, folder: &Path) -> (bool, String) {
         330
     };
     let log = folder.join(format!("{script}.ogm"));
-    let first = device(&rig, script, FaultPlan::random(script, lines));
+    let faults = FaultPlan::random(script, lines);
+    if show {
+        println!("{faults:?}");
+    }
+    let first = device(&rig, script, faults);
     let (result, end) = session(&first, &rig, &log);
     let journal = first.lock().unwrap().journal.take().unwrap();
+    if show {
+        for l in &journal {
+            println!(
+                "{:9.3} {} {}",
+                l.at,
+                if l.to_rig { '>' } else { '<' },
+                l.text
+            );
+        }
+        println!("{result:?}");
+    }
     check_journal(&rig, &journal, end, script);
     let before = if log.exists() {
         readings(&log)
@@ -225,15 +239,19 @@ fn run_script(script: u64, folder: &Path) -> (bool, String) {
 
 #[test]
 fn random_fault_scripts_end_in_a_sentence_and_are_recovered_from() {
-    let count: u64 = std::env::var("OGM_FAULT_SCRIPTS")
+    let count = common::number("OGM_FAULT_SCRIPTS", 120);
+    let folder = common::quick_folder();
+    if let Some(script) = std::env::var("OGM_SCRIPT")
         .ok()
         .and_then(|s| s.parse().ok())
-        .unwrap_or(120);
-    let folder = common::quick_folder();
+    {
+        run_script(script, folder.path(), true);
+        return;
+    }
     let mut unharmed = 0;
     let mut sentences = std::collections::BTreeMap::new();
     for script in 0..count {
-        let (ok, text) = run_script(script, folder.path());
+        let (ok, text) = run_script(script, folder.path(), false);
         unharmed += u64::from(ok);
         *sentences.entry(text).or_insert(0_u32) += 1;
     }
@@ -284,37 +302,4 @@ fn a_cold_lamp_is_waited_for_and_a_dark_one_refused() {
     dark.lock().unwrap().bench.lamp_off_at = Some(0.0);
     let text = session(&dark, &rig, &log).0.unwrap_err().to_string();
     assert!(text.contains("The lamp is off"), "{text}");
-}
-
-#[test]
-#[ignore = "prints the conversation of one script, OGM_SCRIPT=n"]
-fn show_a_script() {
-    let script: u64 = std::env::var("OGM_SCRIPT").unwrap().parse().unwrap();
-    let mut rig = if script.is_multiple_of(2) {
-        Rig::default()
-    } else {
-        Rig::grbl()
-    };
-    if script % 4 < 2 {
-        rig = rig.with_instant_motors();
-    }
-    let lines = if rig.language == Language::Shot {
-        260
-    } else {
-        330
-    };
-    println!("{:?}", FaultPlan::random(script, lines));
-    let folder = common::quick_folder();
-    let first = device(&rig, script, FaultPlan::random(script, lines));
-    let (result, _) = session(&first, &rig, &folder.path().join("x.ogm"));
-    let journal = first.lock().unwrap().journal.take().unwrap();
-    for l in journal {
-        println!(
-            "{:9.3} {} {}",
-            l.at,
-            if l.to_rig { '>' } else { '<' },
-            l.text
-        );
-    }
-    println!("{result:?}");
 }

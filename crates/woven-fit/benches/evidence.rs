@@ -1,12 +1,12 @@
 //! Numbers that take longer than a test may: global minima, coverage of intervals, truths found, speed of whole tables.
 //!
 //! `cargo bench -p woven-fit --bench evidence` prints them all; words after `--` pick some of speed, global, coverage, truth,
-//! outliers, and a number is the count of synthetic sets instead of 1,000.
+//! outliers; a number is the count of synthetic sets instead of 1,000, a second one the number of the first set.
 
 #[path = "../tests/known/mod.rs"]
 mod known;
 
-use known::{Coverage, Truth, coverage, entangled_truth, points, table2, truths};
+use known::{Coverage, Truth, coverage, entangled_truth, points, six, table2, truths};
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Instant;
@@ -41,7 +41,7 @@ fn best_of(rounds: usize, mut work: impl FnMut()) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-fn speed(_sets: u64) {
+fn speed(_first: u64, _sets: u64) {
     let one = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -113,7 +113,7 @@ fn random_truth(spec: &Spec, seed: u64) -> Vec<f64> {
     spec.values(&k, &x)
 }
 
-fn global(sets: u64) {
+fn global(first: u64, sets: u64) {
     let options = Options::default();
     for spec in table2() {
         let reaches = |seed: &u64| {
@@ -134,7 +134,7 @@ fn global(sets: u64) {
             let least = starts.iter().map(|x| cost(x)).fold(f64::INFINITY, f64::min);
             reached <= least * 1.001
         };
-        let found = (0..sets).into_par_iter().filter(reaches).count();
+        let found = (first..first + sets).into_par_iter().filter(reaches).count();
         println!(
             "{}: global minimum of {found} of {sets} random truths ({} starts, against 64)",
             spec.label, options.starts
@@ -145,13 +145,14 @@ fn global(sets: u64) {
 fn print_coverage(truth: &Truth, rows: &[Coverage]) {
     for c in rows {
         println!(
-            "{} {:8}: {:5.1} {:5.1} {:5.1} % of the intervals of 68, 95, 99.7 % hold the truth, {:.1} % within three standard errors; profile in {:.0} %, a limit only in {:.1} %, unseen in {:.1} %{}",
+            "{} {:8}: {:5.1} {:5.1} {:5.1} % of the intervals of 68, 95, 99.7 % hold the truth, {:.1} % within three standard errors, bias {:+.2} of them; profile in {:.0} %, a limit only in {:.1} %, unseen in {:.1} %{}",
             truth.spec.label,
             c.name,
             100.0 * c.shares[0],
             100.0 * c.shares[1],
             100.0 * c.shares[2],
             100.0 * c.three_sigma,
+            c.bias,
             100.0 * c.profiled,
             100.0 * c.limits,
             100.0 * c.unseen,
@@ -164,13 +165,13 @@ fn print_coverage(truth: &Truth, rows: &[Coverage]) {
     }
 }
 
-fn covered(sets: u64) {
-    for truth in truths().iter().chain([&entangled_truth()]) {
-        print_coverage(truth, &coverage(truth, sets));
+fn covered(first: u64, sets: u64) {
+    for truth in six().iter().chain([&entangled_truth()]) {
+        print_coverage(truth, &coverage(truth, first, sets));
     }
 }
 
-fn truth(sets: u64) {
+fn truth(_first: u64, sets: u64) {
     let all = truths();
     for truth in &all {
         let found = known::found_by_aicc(truth, &all, sets);
@@ -178,7 +179,7 @@ fn truth(sets: u64) {
     }
 }
 
-fn outliers(sets: u64) {
+fn outliers(_first: u64, sets: u64) {
     for truth in &truths() {
         for loss in [Loss::Squares, Loss::Huber, Loss::Cauchy] {
             println!(
@@ -195,17 +196,18 @@ fn main() {
         .skip(1)
         .filter(|a| !a.starts_with('-'))
         .collect();
-    let number = wanted.iter().find_map(|w| w.parse().ok());
+    let numbers: Vec<u64> = wanted.iter().filter_map(|w| w.parse().ok()).collect();
+    let (sets, first) = (numbers.first(), numbers.get(1));
     let all = wanted.iter().all(|w| w.parse::<u64>().is_ok());
     for (name, run) in [
-        ("speed", speed as fn(u64)),
+        ("speed", speed as fn(u64, u64)),
         ("global", global),
         ("coverage", covered),
         ("truth", truth),
         ("outliers", outliers),
     ] {
         if all || wanted.iter().any(|w| w == name) {
-            run(number.unwrap_or(1000));
+            run(first.copied().unwrap_or(0), sets.copied().unwrap_or(1000));
         }
     }
 }

@@ -115,7 +115,7 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
         .map(|t| (t, SETS))
         .chain([(&entangled_truth(), SETS)])
     {
-        for c in coverage(truth, sets) {
+        for c in coverage(truth, 0, sets) {
             println!("{} {c:?}", truth.spec.label);
             let [c68, c95, c997] = c.shares;
             if c.identifiable() {

@@ -28,6 +28,16 @@ fn cpu_seconds() -> f64 {
     (ticks(11) + ticks(12)) / 100.0
 }
 
+/// relMSE of one of two pictures, from the difference of a pixel in both.
+fn error(p: [f32; 3], q: [f32; 3]) -> f64 {
+    let channel = |c: usize| {
+        let (p, q) = (f64::from(p[c]), f64::from(q[c]));
+        let m = 0.5 * (p + q);
+        (p - q) * (p - q) / 2.0 / (m * m + 0.01) / 3.0
+    };
+    (0..3).map(channel).sum()
+}
+
 fn load(path: &Path) -> Result<Scene> {
     let loaded =
         woven_render::scene::gltf::load(path, &woven_render::scene::gltf::Options::default())?;
@@ -81,14 +91,10 @@ fn main() -> Result<()> {
             first.beauty().unwrap_or(&[]),
             second.beauty().unwrap_or(&[]),
         );
-        let mut noise = 0.0;
-        let mut mean = 0.0;
-        for (p, q) in a.iter().flatten().zip(b.iter().flatten()) {
-            let (p, q) = (f64::from(*p), f64::from(*q));
-            let m = 0.5 * (p + q);
-            noise += (p - q) * (p - q) / 2.0 / (m * m + 0.01) / (a.len() * 3) as f64;
-            mean += m / (a.len() * 3) as f64;
-        }
+        let errors: Vec<f64> = a.iter().zip(b).map(|(p, q)| error(*p, *q)).collect();
+        let noise = errors.iter().sum::<f64>() / errors.len() as f64;
+        let values = a.iter().chain(b).flatten();
+        let mean = values.map(|&x| f64::from(x)).sum::<f64>() / (a.len() * 6) as f64;
         let samples = f64::from(settings.width * settings.height * spp) / 1e6;
         println!(
             "{name}: {size}, {spp} spp, {wall:.2} s, {cpu:.2} CPU-s, {:.3} M samples per CPU-s, mean {mean:.6}, relMSE {noise:.6}, relMSE x CPU-s {:.5}",
@@ -96,18 +102,9 @@ fn main() -> Result<()> {
             noise * cpu
         );
         if let Some(path) = &out {
-            let noise: Vec<[f32; 3]> = a
+            let noise = errors
                 .iter()
-                .zip(b)
-                .map(|(p, q)| {
-                    let e: f32 = (0..3)
-                        .map(|c| {
-                            let m = 0.5 * (p[c] + q[c]);
-                            (p[c] - q[c]).powi(2) / 2.0 / (m * m + 0.01) / 3.0
-                        })
-                        .sum();
-                    [(e * spp as f32 * 2.0).min(4.0); 3]
-                })
+                .map(|e| [(*e as f32 * spp as f32 * 2.0).min(4.0); 3])
                 .collect();
             woven_render::film::Film::of_beauty(first.width, first.height, noise).write_png(
                 &Path::new(path).with_extension(format!("{name}.png")),

@@ -9,6 +9,7 @@ use clap::Args;
 
 use super::{rig_named, stop_on_signal};
 use ogm_driver::error::{Error, Result};
+use ogm_driver::pose::AXES;
 use ogm_driver::sim::camera::{CameraServer, relay};
 use ogm_driver::sim::fabric::FabricSample;
 use ogm_driver::sim::optics::{PlainCloth, Sample};
@@ -38,6 +39,25 @@ pub(crate) struct SimArgs {
     /// Lamp drift, share per hour.
     #[arg(long, default_value_t = 0.0)]
     drift: f64,
+    /// True angle minus commanded angle of light theta, light phi, view theta, view phi, degrees.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        value_name = "FOUR"
+    )]
+    misaligned: Vec<f64>,
+    /// The detector reads c (1 - x c / full scale): this x.
+    #[arg(long, default_value_t = 0.0, value_name = "X")]
+    curved: f64,
+    /// True full angle of the aperture minus the one of the rig file, degrees.
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        allow_hyphen_values = true,
+        value_name = "DEG"
+    )]
+    aperture_error: f64,
     /// Minutes the lamp has been on at the start.
     #[arg(long, default_value_t = 120.0)]
     lamp_on_min: f64,
@@ -58,12 +78,17 @@ pub(crate) fn sim(args: SimArgs) -> Result<()> {
     if !(args.speed > 0.0
         && args.speed <= 1e6
         && args.drift.abs() < 1.0
-        && (0.0..=1e6).contains(&args.lamp_on_min))
+        && (0.0..=1e6).contains(&args.lamp_on_min)
+        && args.curved.abs() < 0.5
+        && args.aperture_error.abs() < 0.9 * rig.detector.aperture_deg
+        && matches!(args.misaligned.len(), 0 | AXES)
+        && args.misaligned.iter().all(|a| a.abs() <= 10.0))
     {
         return Err(Error::Rig(
-            "Give --speed in 0..1000000, --drift in -1..1 and --lamp-on-min in 0..1000000.".into(),
+            "Give --speed in 0..1000000, --drift in -1..1, --lamp-on-min in 0..1000000, --curved in -0.5..0.5, --misaligned as four angles within 10 degrees and --aperture-error within the aperture.".into(),
         ));
     }
+    let misalignment_deg = <[f64; AXES]>::try_from(args.misaligned.clone()).unwrap_or_default();
     let sample: Arc<dyn Sample> = match &args.fabric {
         Some(path) => Arc::new(FabricSample::read(path)?),
         None => Arc::new(PlainCloth),
@@ -77,6 +102,9 @@ pub(crate) fn sim(args: SimArgs) -> Result<()> {
         seed: args.seed,
         drift_per_hour: args.drift,
         lamp_on_s: args.lamp_on_min * 60.0,
+        misalignment_deg,
+        nonlinearity: args.curved,
+        aperture_error_deg: args.aperture_error,
         ..base
     };
     eprintln!("Simulating {}, in the beam: {}.", rig.name, sample.name());

@@ -10,8 +10,14 @@ use crate::rig::DetectorData;
 pub struct Rate {
     /// Counts a millisecond, dark subtracted.
     pub value: f64,
-    /// Standard error.
+    /// Standard error, of everything below.
     pub sigma: f64,
+    /// The part of it that is this reading's own: light, electronics, ADC, reference diode.
+    pub noise: f64,
+    /// The part of the dark level, which all readings of the same exposures share.
+    pub dark: f64,
+    /// How deep in the detector's range it was read, 0..1 of full scale: times the curvature's error this is a relative error that all readings share.
+    pub depth: f64,
     /// Whether it stands only on shots near the end of the range: a lower bound, not a value.
     pub saturated: bool,
 }
@@ -61,9 +67,9 @@ pub fn merge(
         .map(|s| rate_of(s))
         .collect();
     let mut value = best.iter().sum::<f64>() / best.len() as f64;
-    let mut sigma = 0.0;
+    let (mut noise, mut dark_level, mut depth) = (0.0, 0.0, 0.0);
     for _ in 0..2 {
-        let (mut top, mut weights, mut dark_part) = (0.0, 0.0, 0.0);
+        let (mut top, mut weights, mut dark_part, mut deep) = (0.0, 0.0, 0.0, 0.0);
         for s in &used {
             let (dark_counts, dark_sigma) = dark.at(s.exposure_ms);
             let counts = (value * lamp(s) * s.exposure_ms).max(0.0);
@@ -77,15 +83,20 @@ pub fn merge(
             top += weight * rate_of(s);
             weights += weight;
             dark_part += weight * dark_sigma / scale;
+            deep += weight * counts / full;
         }
         value = top / weights;
         // The dark level is shared by all shots of one exposure: its error adds up, it does not average out. So does the curvature's.
-        let bent = value * linearity.sigma * value.abs() * longest / full;
-        sigma = (1.0 / weights + (dark_part / weights).powi(2) + bent.powi(2)).sqrt();
+        (noise, dark_level, depth) = (weights.sqrt().recip(), dark_part / weights, deep / weights);
     }
     Ok(Rate {
         value,
-        sigma,
+        sigma: noise
+            .hypot(dark_level)
+            .hypot(value * linearity.sigma * depth),
+        noise,
+        dark: dark_level,
+        depth,
         saturated,
     })
 }

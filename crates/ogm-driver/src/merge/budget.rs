@@ -7,7 +7,8 @@ use crate::pose::angle_between;
 use crate::rig::DetectorData;
 
 /// Adds to each value's standard error: slope times the angles' uncertainty (two arms, so √2 of one axis), what the detector arm's error does to the
-/// foreshortening 1/cosθ_v, and what the aperture's blur changes, R²/8 ∇²f for a round aperture of radius R (the second moment of a disc).
+/// foreshortening 1/cosθ_v, and what the aperture's blur changes, R²/8 ∇²f for a round aperture of radius R (the second moment of a disc),
+/// and the solid angle's uncertainty.
 pub(super) fn widen(samples: &mut [Value], detector: &DetectorData) {
     let angle = detector.angle_deg.to_radians() * std::f64::consts::SQRT_2;
     let radius = (detector.aperture_deg / 2.0).to_radians();
@@ -27,7 +28,8 @@ pub(super) fn widen(samples: &mut [Value], detector: &DetectorData) {
             let c = samples[i].pose.view()[2].abs();
             let tilt = (1.0 - c * c).max(0.0).sqrt() / c.max(1e-3);
             let foreshortening = samples[i].f * tilt * detector.angle_deg.to_radians();
-            let parts = [slope * angle, foreshortening, blur];
+            let size = samples[i].f * detector.solid_angle_sigma();
+            let parts = [slope * angle, foreshortening, blur, size];
             samples[i].sigma = parts.into_iter().fold(samples[i].sigma, f64::hypot);
         }
     }
@@ -101,6 +103,7 @@ mod tests {
                     pose: Pose::new(0.0, 0.0, 180.0 - deg.abs(), phi),
                     f: f(deg.to_radians()),
                     sigma: 1e-9,
+                    own: 1e-9,
                 }
             })
             .collect();

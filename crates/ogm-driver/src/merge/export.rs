@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use woven_bsdf::measured::csv::{Direct, Sample, Scan};
 use woven_bsdf::vec3::Vec3;
 
-use super::{Measurement, Value};
+use super::{Measurement, Value, shared};
 use crate::error::{Error, Result};
 
 impl Measurement {
@@ -14,7 +14,20 @@ impl Measurement {
     pub fn to_scan(&self) -> Scan {
         let vec = |d: [f64; 3]| Vec3::new(d[0], d[1], d[2]);
         Scan {
-            comments: self.comments.clone(),
+            comments: self
+                .comments
+                .iter()
+                .cloned()
+                .chain(self.shared.lines())
+                .chain(shared::own_lines(
+                    "own",
+                    self.samples.iter().map(|s| s.own / s.sigma),
+                ))
+                .chain(shared::own_lines(
+                    "own_direct",
+                    self.direct.iter().map(|d| d.own / d.sigma),
+                ))
+                .collect(),
             direct: self
                 .direct
                 .iter()

@@ -7,7 +7,9 @@
 mod budget;
 mod export;
 mod klems;
+mod provenance;
 mod scale;
+mod shared;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -22,6 +24,7 @@ use crate::sim::optics::beam_share;
 
 pub use export::write_whole;
 use scale::Scale;
+pub use shared::Shared;
 
 /// One merged value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +35,8 @@ pub struct Value {
     pub f: f64,
     /// Its standard error, 1/sr.
     pub sigma: f64,
+    /// The part of it that no other value shares, 1/sr.
+    pub own: f64,
 }
 
 /// The straight-through transmittance at one incidence.
@@ -43,6 +48,8 @@ pub struct Straight {
     pub transmittance: f64,
     /// Its standard error.
     pub sigma: f64,
+    /// The part of it that no other value shares.
+    pub own: f64,
     /// The scattered BSDF in this direction, from the neighbours, 1/sr.
     pub scattered: f64,
 }
@@ -66,16 +73,20 @@ pub struct Measurement {
     pub beam: f64,
     /// The white standard over what it should read, and the standard error.
     pub white: Option<(f64, f64)>,
+    /// What all values are wrong by together.
+    pub shared: Shared,
 }
 
 impl Measurement {
-    /// Adds the values of another scan of the same sample; the scale (beam, curvature, white standard) stays that of the first.
+    /// Adds the values of another scan of the same sample; beam, curvature and white standard stay those of the first. Each scan has its own direct beam:
+    /// the larger of the shared errors is stated, as if it were common to both.
     pub fn append(&mut self, other: Measurement) {
         self.comments.extend(other.comments);
         self.samples.extend(other.samples);
         self.direct.extend(other.direct);
         self.saturated.extend(other.saturated);
         self.cut.extend(other.cut);
+        self.shared = self.shared.larger(other.shared);
     }
 }
 
@@ -140,7 +151,7 @@ pub fn merge_contents(contents: &Contents) -> Result<Measurement> {
         })
         .collect();
     let mut out = merge_readings(&readings, &plan, &rig)?;
-    out.comments = comments(contents, &plan, &rig, fingerprint, software, &out);
+    out.comments = provenance::comments(contents, &plan, &rig, fingerprint, software, &out);
     Ok(out)
 }
 
@@ -156,6 +167,7 @@ pub fn merge_readings(readings: &[&Reading], plan: &Plan, rig: &Rig) -> Result<M
         ..Measurement::default()
     };
     let mut straight: Vec<(Pose, Rate)> = Vec::new();
+    let mut scattered: Vec<Rate> = Vec::new();
     let d = &rig.detector;
     let mut seen = BTreeSet::new();
     for r in readings.iter().filter(|r| r.what == What::Sample) {
@@ -188,8 +200,16 @@ pub fn merge_readings(readings: &[&Reading], plan: &Plan, rig: &Rig) -> Result<M
             pose: r.reached,
             f: share.value / projected,
             sigma: share.sigma / projected,
+            own: share.noise / projected,
         });
+        scattered.push(share);
     }
+    let depth = scale.mean_depth(&scattered);
+    for (value, share) in out.samples.iter_mut().zip(&scattered) {
+        // The exposures bring each value to another depth of the detector's range: what the curvature does beside its mean is the row's own.
+        value.own = value.own.hypot(value.f * scale.bend(share.depth - depth));
+    }
+    out.shared = scale.shared(&scattered);
     budget::widen(&mut out.samples, d);
     for (pose, share) in straight {
         let projected = d.solid_angle() * pose.view()[2].abs();
@@ -206,6 +226,9 @@ pub fn merge_readings(readings: &[&Reading], plan: &Plan, rig: &Rig) -> Result<M
             pose,
             transmittance: share.value - under * projected,
             sigma,
+            own: share
+                .noise
+                .hypot(share.value * scale.bend(share.depth - depth)),
             scattered: under,
         });
     }
@@ -243,81 +266,4 @@ fn scattered_under(samples: &[Value], pose: Pose) -> (f64, f64) {
             (at_zero.max(0.0), noise.hypot(0.5 * (at_zero - all[0].1)))
         }
     }
-}
-
-fn comments(
-    contents: &Contents,
-    plan: &Plan,
-    rig: &Rig,
-    fingerprint: &str,
-    software: &str,
-    m: &Measurement,
-) -> Vec<String> {
-    let mut out = vec![format!(
-        "BSDF measured by a goniometer, merged by ogm {}, logged by {software}",
-        env!("CARGO_PKG_VERSION")
-    )];
-    let mut line = |name: &str, value: &str| {
-        if !value.is_empty() {
-            out.push(format!("{name}: {}", value.replace(['\n', '\r'], " ")));
-        }
-    };
-    line("plan", &plan.name);
-    line("sample", &plan.sample);
-    line("operator", &plan.operator);
-    line("rig", &rig.name);
-    for record in &contents.records {
-        if let Record::Session {
-            number: 0,
-            controller,
-            detector,
-            ..
-        } = record
-        {
-            line("controller", controller);
-            line("detector", detector);
-        }
-    }
-    line("sha256 of plan and rig", fingerprint);
-    line(
-        "aperture",
-        &format!(
-            "{} deg full angle, f/{}",
-            rig.detector.aperture_deg, plan.exposure.f_number
-        ),
-    );
-    line(
-        "lamp corrected by",
-        &format!("{:?}", plan.calibration.drift).to_lowercase(),
-    );
-    if let Some((ratio, sigma)) = m.white {
-        line(
-            "white standard over expected",
-            &format!("{ratio:.4} +- {sigma:.4}"),
-        );
-    }
-    if let Some((x, sigma)) = m.linearity.filter(|l| l.1 > 0.0) {
-        line(
-            "curvature of the detector, taken out",
-            &format!("{x:.5} +- {sigma:.5} of full scale"),
-        );
-    }
-    if !m.saturated.is_empty() {
-        line(
-            "saturated and left out",
-            &format!("{} poses", m.saturated.len()),
-        );
-    }
-    if !m.cut.is_empty() {
-        line(
-            "straight beam cut by the aperture, left out",
-            &format!("{} poses", m.cut.len()),
-        );
-    }
-    for damage in &contents.damage {
-        line("damage in the log", damage);
-    }
-    // For the fit, which averages a model over the aperture: its half angle.
-    out.push(format!("aperture_deg,{}", rig.detector.aperture_deg / 2.0));
-    out
 }

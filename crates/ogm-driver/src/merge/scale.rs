@@ -8,6 +8,8 @@ use crate::plan::{Drift, Plan};
 use crate::rig::Rig;
 use crate::sim::optics::WHITE_REFLECTANCE;
 
+use super::shared::Shared;
+
 /// Dark, lamp and direct beam of a log: what turns counts into shares of the beam.
 pub(super) struct Scale {
     rig: Rig,
@@ -56,6 +58,9 @@ impl Scale {
             direct: Rate {
                 value: 1.0,
                 sigma: 0.0,
+                noise: 0.0,
+                dark: 0.0,
+                depth: 0.0,
                 saturated: false,
             },
         };
@@ -77,20 +82,15 @@ impl Scale {
             }
             scale.lamp = points.into_iter().map(|(t, v)| (t, v / first)).collect();
         }
-        let mut weights = (0.0, 0.0);
+        let mut rates = Vec::new();
         for r in of(What::Direct) {
             let rate = scale.rate(r)?;
             if rate.saturated {
                 return Err(Error::Merge("The direct beam is saturated at the shortest exposure; choose a larger f-number or shorter exposures.".into()));
             }
-            let w = 1.0 / rate.sigma.powi(2).max(1e-300);
-            weights = (weights.0 + w * rate.value, weights.1 + w);
+            rates.push(rate);
         }
-        let direct = Rate {
-            value: weights.0 / weights.1,
-            sigma: weights.1.sqrt().recip(),
-            saturated: false,
-        };
+        let direct = mean(&rates, linearity);
         if direct.value.is_nan() || direct.value <= 5.0 * direct.sigma {
             return Err(Error::Merge("The direct beam is not above its noise: was the sample left in, or the shutter closed?".into()));
         }
@@ -131,14 +131,54 @@ impl Scale {
         }
     }
 
-    /// A rate as a share of the direct beam, with the detector's linearity in its error.
+    /// A rate as a share of the direct beam. The curvature bends both, so only the difference of their depths counts.
     pub(super) fn share(&self, rate: Rate) -> Rate {
-        let value = rate.value / self.direct.value;
-        let relative = (self.direct.sigma / self.direct.value).hypot(self.rig.detector.linearity);
+        let unit = self.direct.value;
+        let value = rate.value / unit;
+        let bent = self.bend(rate.depth - self.direct.depth);
+        let relative = self.direct_relative().hypot(bent);
         Rate {
             value,
-            sigma: (rate.sigma / self.direct.value).hypot(value * relative),
-            saturated: rate.saturated,
+            sigma: (rate.noise / unit)
+                .hypot(rate.dark / unit)
+                .hypot(value * relative),
+            noise: rate.noise / unit,
+            dark: rate.dark / unit,
+            ..rate
+        }
+    }
+
+    /// Relative standard error of the direct beam beside the curvature's: its own noise, its dark level, and what the rig file says of the detector.
+    fn direct_relative(&self) -> f64 {
+        (self.direct.noise.hypot(self.direct.dark) / self.direct.value)
+            .hypot(self.rig.detector.linearity)
+    }
+
+    /// Mean depth of the scattered light's readings in the detector's range.
+    pub(super) fn mean_depth(&self, shares: &[Rate]) -> f64 {
+        match shares {
+            [] => self.direct.depth,
+            all => all.iter().map(|s| s.depth).sum::<f64>() / all.len() as f64,
+        }
+    }
+
+    /// Relative standard error that the curvature's uncertainty makes over a difference in depth.
+    pub(super) fn bend(&self, depth: f64) -> f64 {
+        (self.linearity.sigma * depth).abs()
+    }
+
+    /// What all values of the log are wrong by together; `shares` are those of the scattered light.
+    pub(super) fn shared(&self, shares: &[Rate]) -> Shared {
+        let d = &self.rig.detector;
+        let n = shares.len().max(1) as f64;
+        let dark = (shares.iter().map(|s| s.dark * s.dark).sum::<f64>() / n).sqrt();
+        Shared {
+            scale: self
+                .direct_relative()
+                .hypot(self.bend(self.mean_depth(shares) - self.direct.depth)),
+            solid_angle: d.solid_angle_sigma(),
+            floor: dark / d.solid_angle(),
+            angle_deg: d.angle_deg,
         }
     }
 
@@ -151,5 +191,23 @@ impl Scale {
             * rig.detector.solid_angle()
             * r.reached.view()[2].abs();
         Ok(Some((share.value / expected, share.sigma / expected)))
+    }
+}
+
+/// The mean of several readings of one light: their noise averages out, what they share does not.
+fn mean(rates: &[Rate], linearity: Linearity) -> Rate {
+    let weight = |r: &Rate| 1.0 / r.noise.powi(2).max(1e-300);
+    let all: f64 = rates.iter().map(weight).sum();
+    let of =
+        |part: &dyn Fn(&Rate) -> f64| rates.iter().map(|r| weight(r) * part(r)).sum::<f64>() / all;
+    let (value, noise) = (of(&|r| r.value), all.sqrt().recip());
+    let (dark, depth) = (of(&|r| r.dark), of(&|r| r.depth));
+    Rate {
+        value,
+        sigma: noise.hypot(dark).hypot(value * linearity.sigma * depth),
+        noise,
+        dark,
+        depth,
+        saturated: false,
     }
 }

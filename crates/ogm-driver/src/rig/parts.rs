@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 pub struct DetectorData {
     /// Full angle of the round aperture seen from the sample, degrees.
     pub aperture_deg: f64,
+    /// Standard uncertainty of that angle, degrees.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub aperture_sigma_deg: f64,
     /// Counts at which the ADC ends.
     pub full_scale: f64,
     /// Standard deviation of one reading in the dark, counts.
@@ -28,6 +31,7 @@ impl Default for DetectorData {
     fn default() -> Self {
         DetectorData {
             aperture_deg: 1.0,
+            aperture_sigma_deg: 0.0,
             full_scale: 1_048_575.0,
             read_noise: 3.0,
             electrons_per_count: 20.0,
@@ -52,6 +56,7 @@ impl DetectorData {
             self.beam_half_deg,
             self.linearity,
             self.angle_deg,
+            self.aperture_sigma_deg,
         ];
         let good = at_least_zero.iter().all(|x| *x >= 0.0 && x.is_finite())
             && in_range(self.electrons_per_count, f64::MAX);
@@ -66,6 +71,16 @@ impl DetectorData {
         // 2π (1 - cos) without cancellation.
         4.0 * std::f64::consts::PI * (half / 2.0).sin().powi(2)
     }
+
+    /// Relative standard uncertainty of the solid angle.
+    pub fn solid_angle_sigma(&self) -> f64 {
+        2.0 * self.aperture_sigma_deg / self.aperture_deg
+    }
+}
+
+/// A number that a rig file need not name.
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 /// What the controller's output bits switch.

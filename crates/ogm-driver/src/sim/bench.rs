@@ -33,6 +33,8 @@ pub struct Imperfections {
     pub nonlinearity: f64,
     /// True angle minus commanded angle of each axis, degrees.
     pub misalignment_deg: [f64; AXES],
+    /// True full angle of the aperture minus the one the rig file states, degrees.
+    pub aperture_error_deg: f64,
     /// Counts a millisecond of the whole beam at f/4.
     pub counts_per_ms: f64,
 }
@@ -51,6 +53,7 @@ impl Default for Imperfections {
             dark_rate: 0.05,
             nonlinearity: 0.0,
             misalignment_deg: [0.0; AXES],
+            aperture_error_deg: 0.0,
             counts_per_ms: 600_000.0,
         }
     }
@@ -203,7 +206,8 @@ impl Bench {
             _ => Holder::White,
         };
         let d = &self.rig.detector;
-        let share = flux(&*self.sample, holder, pose, d.aperture_deg, d.beam_half_deg);
+        let aperture = d.aperture_deg + self.wrong.aperture_error_deg;
+        let share = flux(&*self.sample, holder, pose, aperture, d.beam_half_deg);
         let stop = (4.0 / f_number.max(0.5)).powi(2);
         let lamp = self.lamp(now + exposure_ms / 2000.0);
         self.wrong.counts_per_ms * exposure_ms * stop * share * lamp

@@ -92,6 +92,24 @@ pub fn truths() -> Vec<Truth> {
     ]
 }
 
+/// The six models of the paper's table 2, for the coverage of their error bars.
+pub fn six() -> Vec<Truth> {
+    let mut all = truths();
+    all.extend([
+        Truth::new("cook-torrance", &[0.2, 5.0, 0.25, 1.5], true, 5),
+        Truth::new("ashikhmin-shirley", &[0.2, 0.5, 40.0, 15.0, 0.5], true, 6),
+        Truth::new("phong", &[0.2, 0.3, 30.0], true, 7),
+    ]);
+    // The lobe's strength and what Fresnel takes of it are one number here: index and f0 are held where they stand.
+    for truth in &mut all {
+        truth
+            .spec
+            .coordinates
+            .retain(|c| !["n", "f0"].contains(&c.name));
+    }
+    all
+}
+
 /// The hard one: a broad lobe and an even floor are hardly told apart, and in many sets one of them ends at its bound.
 pub fn entangled_truth() -> Truth {
     Truth::new("hgf", &[0.4, 0.3, 0.5, 0.85, 0.1], true, 4)
@@ -111,6 +129,8 @@ pub struct Coverage {
     pub unseen: f64,
     /// Share of the sets in which the profile was needed.
     pub profiled: f64,
+    /// Mean of (value - truth) / standard error: what bias there is, in standard errors.
+    pub bias: f64,
 }
 
 impl Coverage {
@@ -120,12 +140,13 @@ impl Coverage {
     }
 }
 
-pub fn coverage(truth: &Truth, sets: u64) -> Vec<Coverage> {
+/// Over the sets from number `first` on.
+pub fn coverage(truth: &Truth, first: u64, sets: u64) -> Vec<Coverage> {
     let options = Options {
         starts: 2,
         ..Options::default()
     };
-    let fits: Vec<Vec<Parameter>> = (0..sets)
+    let fits: Vec<Vec<Parameter>> = (first..first + sets)
         .into_par_iter()
         .map(|seed| fit(&truth.spec, &points(truth.scan(seed)), &options).parameters)
         .collect();
@@ -135,6 +156,10 @@ pub fn coverage(truth: &Truth, sets: u64) -> Vec<Coverage> {
         let share = |hit: &dyn Fn(&Parameter) -> Option<bool>| {
             let known: Vec<bool> = fits.iter().filter_map(|f| hit(&f[j])).collect();
             known.iter().filter(|&&h| h).count() as f64 / known.len().max(1) as f64
+        };
+        let mean = |value: &dyn Fn(&Parameter) -> Option<f64>| {
+            let known: Vec<f64> = fits.iter().filter_map(|f| value(&f[j])).collect();
+            known.iter().sum::<f64>() / known.len().max(1) as f64
         };
         let holds = |i: Option<(f64, f64)>| i.map(|(lo, hi)| (lo..=hi).contains(&want));
         let limit = |p: &Parameter| p.remark.contains("at most") || p.remark.contains("at least");
@@ -152,6 +177,7 @@ pub fn coverage(truth: &Truth, sets: u64) -> Vec<Coverage> {
             limits: share(&|p| Some(limit(p))),
             unseen: share(&|p| Some(p.interval95.is_none() && !limit(p))),
             profiled: share(&|p| Some(p.profiled)),
+            bias: mean(&|p| p.standard_error.map(|se| (p.value - want) / se)),
         }
     };
     names.iter().enumerate().map(one).collect()

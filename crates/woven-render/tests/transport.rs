@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{backends, furnace, mean, picture, quad, room, sheets_over_floor};
+use common::{backends, curtain_room, furnace, mean, picture, quad, room, sheets_over_floor};
 use glam::Vec3;
 use woven_render::render::{Backend, Integrator, Settings};
 use woven_render::scene::{Camera, LAYER_SUN, Light, Material, Scene};
@@ -272,6 +272,49 @@ fn sun_disc_and_point_light_give_their_irradiance() {
                 2e-3,
                 &format!("{backend:?} {light:?}"),
             );
+        }
+    }
+}
+
+#[test]
+fn a_marked_window_changes_the_noise_and_not_the_mean() {
+    let marked = curtain_room(
+        Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35),
+        60,
+    );
+    let mut unmarked = marked.clone();
+    unmarked.portals.clear();
+    for integrator in [Integrator::Direct, Integrator::Path] {
+        let settings = |seed: u32, spp: u32| Settings {
+            width: 48,
+            height: 36,
+            spp,
+            seed,
+            integrator,
+            ..Settings::default()
+        };
+        let mut means = Vec::new();
+        let mut noises = Vec::new();
+        for scene in [&marked, &unmarked] {
+            let long = picture(scene, &settings(1, 256), Backend::Cpu);
+            means.push(mean(&long));
+            let short = picture(scene, &settings(2, 8), Backend::Cpu);
+            let pairs = long.beauty().unwrap().iter().zip(short.beauty().unwrap());
+            noises.push(
+                pairs
+                    .map(|(a, b)| f64::from((a[1] - b[1]).powi(2) / (a[1] * a[1] + 0.01)))
+                    .sum::<f64>(),
+            );
+        }
+        // The issue asks for 0.2 %; the noise of the means is about a tenth of that.
+        assert_mean(means[0], means[1], 2e-3, &format!("{integrator:?}"));
+        eprintln!(
+            "{integrator:?}: relMSE falls to {:.2} of what it was, means {means:?}",
+            noises[0] / noises[1]
+        );
+        if integrator == Integrator::Direct {
+            // The panel is mostly behind the wall from beside the window.
+            assert!(noises[0] < 0.5 * noises[1], "{noises:?}");
         }
     }
 }

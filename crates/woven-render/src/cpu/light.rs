@@ -8,7 +8,7 @@ use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
 use super::math::{acos, atan2, luminance, sincos};
-use super::rect;
+use super::rect::{self, Part, WHOLE};
 use super::surface;
 use crate::table::{DOUBLE_SIDED, LightRow, NONE, POINT, RECT, SKY, SPOT, SUN, TRIANGLE, Table};
 
@@ -69,6 +69,23 @@ pub(crate) fn place(table: &Table, p: Vec3, n: Vec3, transmits: bool) -> Place {
     place
 }
 
+/// The part of a rectangular light that can be seen at all: in a room with windows, of a light outside, what shows
+/// through them.
+fn part(table: &Table, at: &Place, r: &LightRow) -> Part {
+    if !at.inside || r.kind != RECT || r.area < 0.0 {
+        return WHOLE;
+    }
+    let g = &table.globals;
+    let windows = &table.lights[g.lights as usize..(g.lights + g.portals) as usize];
+    let parts = windows.iter().filter_map(|w| rect::part(r, w, at.p));
+    parts
+        .reduce(|a, b| Part {
+            low: a.low.min(b.low),
+            high: a.high.max(b.high),
+        })
+        .unwrap_or(WHOLE)
+}
+
 /// What the light is expected to give at the place, not counting what stands between.
 fn weight(table: &Table, at: &Place, i: u32) -> f32 {
     let g = &table.globals;
@@ -78,7 +95,8 @@ fn weight(table: &Table, at: &Place, i: u32) -> f32 {
     match r.kind {
         RECT | TRIANGLE => {
             let half = if r.kind == RECT { 0.5 } else { 1.0 / 3.0 };
-            let to = Vec3::from(r.p) + (Vec3::from(r.u) + Vec3::from(r.v)) * half - at.p;
+            let part = part(table, at, r);
+            let to = Vec3::from(r.p) + part.point(r, half, half) - at.p;
             let two = table.materials[table.shade[r.place as usize].material as usize].flags
                 & DOUBLE_SIDED
                 != 0;
@@ -87,7 +105,7 @@ fn weight(table: &Table, at: &Place, i: u32) -> f32 {
             }
             let d2 = to.length_squared().max(1e-12);
             let cos = to.dot(n).abs() / d2.sqrt();
-            let area = r.area.abs();
+            let area = r.area.abs() * part.size();
             lum * area * (0.1 + 0.9 * cos) / (d2 + 0.5 * area)
         }
         SUN => {
@@ -219,7 +237,7 @@ fn towards(table: &Table, at: &Place, i: u32, share: f32, u: f32, v: f32) -> Opt
             let (wi, distance, pdf) = if triangle {
                 rect::sample_triangle(r, at.p, a, b)
             } else {
-                rect::sample(r, at.p, a, b)
+                rect::sample(r, &part(table, at, r), at.p, a, b)
             };
             let material = &table.materials[table.shade[r.place as usize].material as usize];
             if pdf <= 0.0 || (material.flags & DOUBLE_SIDED == 0 && wi.dot(n) >= 0.0) {
@@ -314,7 +332,10 @@ pub(crate) fn density(table: &Table, at: &Place, i: u32, wi: Vec3, distance: f32
     }
     let r = &table.lights[i as usize];
     match r.kind {
-        RECT | TRIANGLE => share * rect::density(r, at.p, wi, distance, r.kind == TRIANGLE),
+        RECT | TRIANGLE => {
+            let part = part(table, at, r);
+            share * rect::density(r, &part, at.p, wi, distance, r.kind == TRIANGLE)
+        }
         SKY => share * sky_density(table, at, wi),
         _ => 0.0,
     }
@@ -369,6 +390,7 @@ fn sample_sky(table: &Table, at: &Place, u: f32, v: f32) -> (Vec3, f32) {
         }
         wi = rect::sample(
             &table.lights[chosen as usize],
+            &WHOLE,
             at.p,
             (rest / w).clamp(0.0, 1.0),
             v,
@@ -434,7 +456,8 @@ fn sky_density(table: &Table, at: &Place, d: Vec3) -> f32 {
             let r = &table.lights[(g.lights + i) as usize];
             let t = rect::crossing(r, at.p, d);
             if t > 0.0 {
-                pdf += g.portal_share * window(r, at.p) / all * rect::density(r, at.p, d, t, false);
+                let part = g.portal_share * window(r, at.p) / all;
+                pdf += part * rect::density(r, &WHOLE, at.p, d, t, false);
             }
         }
     }

@@ -1,9 +1,10 @@
 //! A rectangle as seen from a point: sampled evenly over its solid angle. The pair of `shader/rect.wgsl`.
 //!
 //! Ureña, Fajardo and King 2013, "An area-preserving parametrization for spherical rectangles". Where the solid angle
-//! is too small for single precision, and for parallelograms, evenly over the area.
+//! is too small for single precision, and for parallelograms, evenly over the area. What can only be seen through a
+//! window is sampled on the [`Part`] that shows there.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use std::f32::consts::TAU;
 
 use super::math::{acos, sincos};
@@ -12,6 +13,79 @@ use crate::table::LightRow;
 /// Solid angles below this are sampled by area: four angles of some 2π in single precision carry an error of about
 /// 1e-6 sr, 5e-5 of this.
 const SMALL: f32 = 0.02;
+
+/// The part of a rectangle between two corners, in shares of its edges.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part {
+    pub low: Vec2,
+    pub high: Vec2,
+}
+
+/// All of a rectangle.
+pub(crate) const WHOLE: Part = Part {
+    low: Vec2::ZERO,
+    high: Vec2::ONE,
+};
+
+impl Part {
+    pub(crate) fn size(&self) -> f32 {
+        let d = self.high - self.low;
+        d.x.max(0.0) * d.y.max(0.0)
+    }
+
+    /// A point of the rectangle, from the corner: (0, 0) and (1, 1) are corners of the part.
+    pub(crate) fn point(&self, r: &LightRow, u: f32, v: f32) -> Vec3 {
+        let at = self.low + (self.high - self.low) * Vec2::new(u, v);
+        Vec3::from(r.u) * at.x + Vec3::from(r.v) * at.y
+    }
+
+    /// Holds the point `q` from the corner; a hair wider, so that rounding loses no sample.
+    fn holds(&self, r: &LightRow, q: Vec3) -> bool {
+        let (u, v) = (Vec3::from(r.u), Vec3::from(r.v));
+        let at = Vec2::new(q.dot(u) / u.length_squared(), q.dot(v) / v.length_squared());
+        let hair = Vec2::splat(1e-4);
+        at.cmpge(self.low - hair).all() && at.cmple(self.high + hair).all()
+    }
+}
+
+/// What shows of a rectangle from `p` through a window at most: the corners of the window cast on its plane, and the
+/// smallest part around them. Everything, unless the rectangle lies behind the window.
+pub(crate) fn part(r: &LightRow, window: &LightRow, p: Vec3) -> Option<Part> {
+    let n = Vec3::from(r.n);
+    let (u, v) = (Vec3::from(r.u), Vec3::from(r.v));
+    let out = Vec3::from(window.n);
+    let nearest = (Vec3::from(r.p) - Vec3::from(window.p)).dot(out)
+        + u.dot(out).max(0.0)
+        + v.dot(out).max(0.0);
+    if nearest > 0.0 {
+        return None;
+    }
+    let height = (Vec3::from(r.p) - p).dot(n);
+    let mut low = Vec2::splat(f32::INFINITY);
+    let mut high = Vec2::splat(f32::NEG_INFINITY);
+    for corner in 0..4 {
+        let mut d = Vec3::from(window.p) - p;
+        if corner & 1 != 0 {
+            d += Vec3::from(window.u);
+        }
+        if corner & 2 != 0 {
+            d += Vec3::from(window.v);
+        }
+        // A ray past the corner that misses the plane, or runs along it: all of it may show.
+        let along = d.dot(n);
+        if along * height <= 1e-3 * height * height {
+            return Some(WHOLE);
+        }
+        let q = p + d * (height / along) - Vec3::from(r.p);
+        let at = Vec2::new(q.dot(u) / u.length_squared(), q.dot(v) / v.length_squared());
+        low = low.min(at);
+        high = high.max(at);
+    }
+    Some(Part {
+        low: low.clamp(Vec2::ZERO, Vec2::ONE),
+        high: high.clamp(Vec2::ZERO, Vec2::ONE),
+    })
+}
 
 /// A rectangle in the frame of its own sides, the point at the origin.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +105,7 @@ struct Spherical {
     solid_angle: f32,
 }
 
-fn spherical(r: &LightRow, p: Vec3) -> Spherical {
+fn spherical(r: &LightRow, part: &Part, p: Vec3) -> Spherical {
     let (u, v) = (Vec3::from(r.u), Vec3::from(r.v));
     let (lu, lv) = (u.length(), v.length());
     let (x, y) = (u / lu, v / lv);
@@ -42,8 +116,8 @@ fn spherical(r: &LightRow, p: Vec3) -> Spherical {
         z0 = -z0;
         z = -z;
     }
-    let (x0, y0) = (d.dot(x), d.dot(y));
-    let (x1, y1) = (x0 + lu, y0 + lv);
+    let (x0, y0) = (d.dot(x) + part.low.x * lu, d.dot(y) + part.low.y * lv);
+    let (x1, y1) = (d.dot(x) + part.high.x * lu, d.dot(y) + part.high.y * lv);
     let z2 = (z0 * z0).max(1e-20);
     // z of the normals of the four planes through the point and a side.
     let n0 = -y0 / (z2 + y0 * y0).sqrt();
@@ -74,9 +148,9 @@ fn spherical(r: &LightRow, p: Vec3) -> Spherical {
 }
 
 /// A direction from `p` to the rectangle, its distance, and the density per solid angle (0: none).
-pub(crate) fn sample(r: &LightRow, p: Vec3, u: f32, v: f32) -> (Vec3, f32, f32) {
+pub(crate) fn sample(r: &LightRow, part: &Part, p: Vec3, u: f32, v: f32) -> (Vec3, f32, f32) {
     if r.area > 0.0 {
-        let s = spherical(r, p);
+        let s = spherical(r, part, p);
         if s.solid_angle > SMALL {
             let (sin, cos) = sincos(u * s.solid_angle + s.k);
             let fu = (cos * s.b0 - s.b1)
@@ -98,17 +172,16 @@ pub(crate) fn sample(r: &LightRow, p: Vec3, u: f32, v: f32) -> (Vec3, f32, f32) 
             return (to * (1.0 / distance), distance, 1.0 / s.solid_angle);
         }
     }
-    let to = Vec3::from(r.p) + Vec3::from(r.u) * u + Vec3::from(r.v) * v - p;
-    by_area(r, to)
+    by_area(r, part.size(), Vec3::from(r.p) + part.point(r, u, v) - p)
 }
 
 /// The same for a triangle, always by area.
 pub(crate) fn sample_triangle(r: &LightRow, p: Vec3, u: f32, v: f32) -> (Vec3, f32, f32) {
-    let to = Vec3::from(r.p) + Vec3::from(r.u) * u + Vec3::from(r.v) * v - p;
-    by_area(r, to)
+    by_area(r, 1.0, Vec3::from(r.p) + WHOLE.point(r, u, v) - p)
 }
 
-fn by_area(r: &LightRow, to: Vec3) -> (Vec3, f32, f32) {
+/// A direction along `to`, evenly over a share of the area.
+fn by_area(r: &LightRow, share: f32, to: Vec3) -> (Vec3, f32, f32) {
     let distance = to.length().max(1e-9);
     let d = to * (1.0 / distance);
     let cos = d.dot(Vec3::from(r.n)).abs();
@@ -116,22 +189,32 @@ fn by_area(r: &LightRow, to: Vec3) -> (Vec3, f32, f32) {
         d,
         distance,
         if cos > 1e-6 {
-            distance * distance / (r.area.abs() * cos)
+            distance * distance / (r.area.abs() * share * cos)
         } else {
             0.0
         },
     )
 }
 
-/// Density of [`sample`] (or of [`sample_triangle`]) for direction `d` to a point of it at `distance`.
-pub(crate) fn density(r: &LightRow, p: Vec3, d: Vec3, distance: f32, triangle: bool) -> f32 {
+/// Density of [`sample`] (or of [`sample_triangle`] with [`WHOLE`]) for direction `d` to a point of it at `distance`.
+pub(crate) fn density(
+    r: &LightRow,
+    part: &Part,
+    p: Vec3,
+    d: Vec3,
+    distance: f32,
+    triangle: bool,
+) -> f32 {
     if r.area > 0.0 && !triangle {
-        let s = spherical(r, p);
+        if !part.holds(r, p + d * distance - Vec3::from(r.p)) {
+            return 0.0;
+        }
+        let s = spherical(r, part, p);
         if s.solid_angle > SMALL {
             return 1.0 / s.solid_angle;
         }
     }
-    by_area(r, d * distance).2
+    by_area(r, part.size(), d * distance).2
 }
 
 /// Distance at which a ray from `p` along `d` crosses the parallelogram; negative when it does not.
@@ -189,7 +272,7 @@ mod tests {
                 sum += f64::from(to.normalize().z.abs() / to.length_squared() * 2.0)
                     / f64::from(n * n);
             }
-            let (_, _, pdf) = sample(&r, p, 0.5, 0.5);
+            let (_, _, pdf) = sample(&r, &WHOLE, p, 0.5, 0.5);
             // The midpoint rule is good to 1e-4 here.
             assert!(
                 (sum * f64::from(pdf) - 1.0).abs() < 3e-4,
@@ -212,7 +295,7 @@ mod tests {
                 ((i / n) as f32 + 0.5) / n as f32,
             );
             let f = |d: Vec3| f64::from(d.x * d.x + 0.3 * d.y);
-            let (d, t, pdf) = sample(&r, p, u, v);
+            let (d, t, pdf) = sample(&r, &WHOLE, p, u, v);
             assert!((d * t + p - Vec3::from(r.p)).dot(Vec3::from(r.n)).abs() < 1e-4);
             assert!(crossing(&r, p, d) > 0.0);
             by_angle += f(d) / f64::from(pdf);

@@ -38,20 +38,51 @@ fn light_place(p: vec3<f32>, n: vec3<f32>, transmits: bool) -> Place {
     return place;
 }
 
+// The part of a rectangular light that can be seen at all: in a room with windows, of a light outside, what shows
+// through them.
+fn light_part(at: Place, i: u32) -> Part {
+    if (!at.inside || lights[i].kind != RECT || lights[i].area < 0.0) {
+        return whole();
+    }
+    let first = frame.globals.lights;
+    var low = vec2<f32>(2.0);
+    var high = vec2<f32>(-1.0);
+    for (var k = 0u; k < frame.globals.portals; k++) {
+        if (behind(i, first + k)) {
+            let part = part_through(i, first + k, at.p);
+            low = min(low, part.low);
+            high = max(high, part.high);
+        }
+    }
+    if (low.x > 1.0) {
+        return whole();
+    }
+    return Part(low, high);
+}
+
+// Of a window through which light i, the sky, is sampled: all.
+fn row_part(at: Place, i: u32, row: u32) -> Part {
+    if (row != i) {
+        return whole();
+    }
+    return light_part(at, i);
+}
+
 fn light_weight(at: Place, i: u32) -> f32 {
     let lum = luminance(lights[i].radiance);
     let n = lights[i].n;
     let kind = lights[i].kind;
     if (kind == RECT || kind == TRIANGLE) {
         let half = select(1.0 / 3.0, 0.5, kind == RECT);
-        let to = lights[i].p + (lights[i].u + lights[i].v) * half - at.p;
+        let part = light_part(at, i);
+        let to = lights[i].p + part_point(part, i, half, half) - at.p;
         let two = (materials[shades[lights[i].place].material].flags & DOUBLE_SIDED) != 0u;
         if (!two && dot(at.p - lights[i].p, n) <= 0.0) {
             return 0.0;
         }
         let d2 = max(length2(to), 1e-12);
         let c = abs(dot(to, n)) / sqrt(d2);
-        let area = abs(lights[i].area);
+        let area = abs(lights[i].area) * part_size(part);
         return lum * area * (0.1 + 0.9 * c) / (d2 + 0.5 * area);
     }
     if (kind == SUN) {
@@ -193,7 +224,7 @@ fn light_towards(at: Place, i: u32, share: f32, u1: f32, v1: f32) -> LightSample
         if (row == NONE) {
             t = Towards(picture_sample(a, b), 1e9, 1.0);
         } else {
-            t = rect_sample(row, at.p, a, b, triangle);
+            t = rect_sample(row, row_part(at, i, row), at.p, a, b, triangle);
         }
         var radiance = lights[i].radiance;
         if (kind == SKY) {
@@ -276,7 +307,7 @@ fn direction_density(at: Place, i: u32, wi: vec3<f32>, distance: f32) -> f32 {
             part = frame.globals.portal_share * window(row, at.p) / all;
         }
         if (t > 0.0) {
-            pdf += part * rect_density(row, at.p, wi, t, kind == TRIANGLE);
+            pdf += part * rect_density(row, row_part(at, i, row), at.p, wi, t, kind == TRIANGLE);
         }
     }
     if (picture > 0.0) {

@@ -2,6 +2,67 @@
 
 const SMALL: f32 = 0.02;
 
+// The part of a rectangle between two corners, in shares of its edges.
+struct Part {
+    low: vec2<f32>,
+    high: vec2<f32>,
+}
+
+fn whole() -> Part {
+    return Part(vec2<f32>(0.0), vec2<f32>(1.0));
+}
+
+fn part_size(part: Part) -> f32 {
+    let d = part.high - part.low;
+    return max(d.x, 0.0) * max(d.y, 0.0);
+}
+
+fn part_point(part: Part, r: u32, u: f32, v: f32) -> vec3<f32> {
+    let at = part.low + (part.high - part.low) * vec2<f32>(u, v);
+    return lights[r].u * at.x + lights[r].v * at.y;
+}
+
+fn on_rect(r: u32, q: vec3<f32>) -> vec2<f32> {
+    return vec2<f32>(dot(q, lights[r].u) / length2(lights[r].u), dot(q, lights[r].v) / length2(lights[r].v));
+}
+
+fn part_holds(part: Part, r: u32, q: vec3<f32>) -> bool {
+    let at = on_rect(r, q);
+    let hair = vec2<f32>(1e-4);
+    return all(at >= part.low - hair) && all(at <= part.high + hair);
+}
+
+fn behind(r: u32, window: u32) -> bool {
+    let out = lights[window].n;
+    let first = dot(lights[r].p - lights[window].p, out);
+    return first + max(dot(lights[r].u, out), 0.0) + max(dot(lights[r].v, out), 0.0) <= 0.0;
+}
+
+// What shows of rectangle r from p through a window at most; r is behind it.
+fn part_through(r: u32, window: u32, p: vec3<f32>) -> Part {
+    let n = lights[r].n;
+    let height = dot(lights[r].p - p, n);
+    var low = vec2<f32>(3.0e38);
+    var high = vec2<f32>(-3.0e38);
+    for (var corner = 0u; corner < 4u; corner++) {
+        var d = lights[window].p - p;
+        if ((corner & 1u) != 0u) {
+            d += lights[window].u;
+        }
+        if ((corner & 2u) != 0u) {
+            d += lights[window].v;
+        }
+        let along = dot(d, n);
+        if (along * height <= 1e-3 * height * height) {
+            return whole();
+        }
+        let at = on_rect(r, p + d * (height / along) - lights[r].p);
+        low = min(low, at);
+        high = max(high, at);
+    }
+    return Part(clamp(low, vec2<f32>(0.0), vec2<f32>(1.0)), clamp(high, vec2<f32>(0.0), vec2<f32>(1.0)));
+}
+
 struct Spherical {
     x: vec3<f32>,
     y: vec3<f32>,
@@ -24,7 +85,7 @@ struct Towards {
     pdf: f32,
 }
 
-fn spherical(r: u32, p: vec3<f32>) -> Spherical {
+fn spherical(r: u32, part: Part, p: vec3<f32>) -> Spherical {
     let lu = sqrt(length2(lights[r].u));
     let lv = sqrt(length2(lights[r].v));
     let x = lights[r].u / lu;
@@ -36,10 +97,10 @@ fn spherical(r: u32, p: vec3<f32>) -> Spherical {
         z0 = -z0;
         z = -z;
     }
-    let x0 = dot(d, x);
-    let y0 = dot(d, y);
-    let x1 = x0 + lu;
-    let y1 = y0 + lv;
+    let x0 = dot(d, x) + part.low.x * lu;
+    let y0 = dot(d, y) + part.low.y * lv;
+    let x1 = dot(d, x) + part.high.x * lu;
+    let y1 = dot(d, y) + part.high.y * lv;
     let z2 = max(z0 * z0, 1e-20);
     let n0 = -y0 / sqrt(z2 + y0 * y0);
     let n1 = x1 / sqrt(z2 + x1 * x1);
@@ -53,19 +114,19 @@ fn spherical(r: u32, p: vec3<f32>) -> Spherical {
     return Spherical(x, y, z, x0, x1, y0, y1, z0, n0, n2, k, g0 + g1 - k);
 }
 
-fn by_area(r: u32, to: vec3<f32>) -> Towards {
+fn by_area(r: u32, share: f32, to: vec3<f32>) -> Towards {
     let distance = max(sqrt(length2(to)), 1e-9);
     let d = to * (1.0 / distance);
     let c = abs(dot(d, lights[r].n));
     if (c > 1e-6) {
-        return Towards(d, distance, distance * distance / (abs(lights[r].area) * c));
+        return Towards(d, distance, distance * distance / (abs(lights[r].area) * share * c));
     }
     return Towards(d, distance, 0.0);
 }
 
-fn rect_sample(r: u32, p: vec3<f32>, u: f32, v: f32, triangle: bool) -> Towards {
+fn rect_sample(r: u32, part: Part, p: vec3<f32>, u: f32, v: f32, triangle: bool) -> Towards {
     if (lights[r].area > 0.0 && !triangle) {
-        let s = spherical(r, p);
+        let s = spherical(r, part, p);
         if (s.solid_angle > SMALL) {
             let sc = sincos(u * s.solid_angle + s.k);
             let fu = (sc.y * s.b0 - s.b1) / select(sc.x, copysign1(1e-9, sc.x), abs(sc.x) < 1e-9);
@@ -81,17 +142,20 @@ fn rect_sample(r: u32, p: vec3<f32>, u: f32, v: f32, triangle: bool) -> Towards 
             return Towards(to * (1.0 / distance), distance, 1.0 / s.solid_angle);
         }
     }
-    return by_area(r, lights[r].p + lights[r].u * u + lights[r].v * v - p);
+    return by_area(r, part_size(part), lights[r].p + part_point(part, r, u, v) - p);
 }
 
-fn rect_density(r: u32, p: vec3<f32>, d: vec3<f32>, distance: f32, triangle: bool) -> f32 {
+fn rect_density(r: u32, part: Part, p: vec3<f32>, d: vec3<f32>, distance: f32, triangle: bool) -> f32 {
     if (lights[r].area > 0.0 && !triangle) {
-        let s = spherical(r, p);
+        if (!part_holds(part, r, p + d * distance - lights[r].p)) {
+            return 0.0;
+        }
+        let s = spherical(r, part, p);
         if (s.solid_angle > SMALL) {
             return 1.0 / s.solid_angle;
         }
     }
-    return by_area(r, d * distance).pdf;
+    return by_area(r, part_size(part), d * distance).pdf;
 }
 
 fn crossing(r: u32, p: vec3<f32>, d: vec3<f32>) -> f32 {

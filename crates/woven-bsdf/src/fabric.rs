@@ -61,6 +61,20 @@ pub struct WeaveTable {
     /// "plain", "twill 2/2", … or the name of a draft.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub pattern: String,
+    /// A picture (PNG) beside the fabric file, of one repeat of a lace or a jacquard: white where it is open.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub openness_map: String,
+    /// How often the map repeats over a unit of the mesh's texture coordinates, along the weft and along the warp; 0: once.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub map_repeats: [f64; 2],
+    /// What the map says: holes in the sheet, whose own weave goes on between them (a lace); or, if true, the share of
+    /// the ground that is woven openly, the rest being closed (a jacquard): gap = map × openness of the weave.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub map_multiplies: bool,
+}
+
+fn is_default<T: Default + PartialEq>(x: &T) -> bool {
+    *x == T::default()
 }
 
 /// `[optics]`.
@@ -145,7 +159,7 @@ impl Fabric {
             ))
         })?;
         let color_of = |key: &String| match key.strip_suffix(BACK) {
-            Some(name) if ["r_d", "k_r"].contains(&name) => name.to_owned(),
+            Some(name) if ["r_d", "k_r", "sheen"].contains(&name) => name.to_owned(),
             _ => key.clone(),
         };
         let colored = table.colors.keys().map(color_of);
@@ -205,7 +219,7 @@ impl Fabric {
                 // The yarn cannot give more than it gets; the slack is for decimals in files.
                 if sum > 1.0 + 1e-6 {
                     return Err(Refused::new(format!(
-                        "t_d + k_t + r_d + k_r = {sum:.4} in channel {c}: more than the light it gets"
+                        "t_d + k_t + r_d + k_r + sheen = {sum:.4} in channel {c}: more than the light it gets"
                     )));
                 }
             }

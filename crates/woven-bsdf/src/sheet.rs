@@ -2,16 +2,16 @@
 //!
 //! Three parts are visible in real goniometer data of shade cloth: a straight-through peak, an anisotropic skirt and a
 //! diffuse floor. The peak is the gap ([`Sheet::gap`]), a delta kept apart; the rest is this model's value. Light that
-//! hits the yarn (the cover, 1 - gap) is shared between the four factors, so that
-//! gap + R + T ≤ 1 in every direction whenever t_d + k_t + r_d + k_r ≤ 1, and = 1 (to the precision of the albedo's
-//! closed form) whenever they sum to 1 without k_r. All terms are reciprocal. With c the cover, c0 its least value (at
+//! hits the yarn (the cover, 1 - gap) is shared between the five factors, so that
+//! gap + R + T ≤ 1 in every direction whenever t_d + k_t + r_d + k_r + sheen ≤ 1, and = 1 (to the precision of the albedo's
+//! closed form) whenever they sum to 1 without k_r and sheen. All terms are reciprocal. With c the cover, c0 its least value (at
 //! normal incidence) and c̄ its mean: the diffuse terms carry c(l) c(v)/c̄; the forward lobe carries c0, what masking
 //! takes from it comes back diffusely (Kulla and Conty 2017), and the cover that a tilt adds to c0 scatters diffusely
-//! too, as (c(l) - c0)(c(v) - c0)/(c̄ - c0); the reflection lobe carries min(c(l), c(v)).
+//! too, as (c(l) - c0)(c(v) - c0)/(c̄ - c0); the reflection lobe and the sheen carry min(c(l), c(v)).
 
 use crate::model::{Linear, MAX_SHAPE, Model, Param, Shape, fold};
 use crate::real::Real;
-use crate::term::{albedo, fresnel, ggx, warp};
+use crate::term::{albedo, fresnel, fuzz, ggx, warp};
 use crate::vec3::Vec3;
 use crate::weave;
 use std::f64::consts::PI;
@@ -29,6 +29,8 @@ pub mod linear {
     pub const R_D: usize = 2;
     /// Reflection lobe.
     pub const K_R: usize = 3;
+    /// Sheen.
+    pub const SHEEN: usize = 4;
 }
 
 /// Places of the shape parameters and derived constants.
@@ -81,12 +83,13 @@ fn inv_tilted_cover<R: Real>(s: &Shape<R>, least: R) -> R {
     (s[INV_MEAN_COVER].recip() - least).max(R::of(1e-6)).recip()
 }
 
-/// The chances of (diffuse transmission, forward lobe, diffuse reflection); the reflection lobe has the rest.
+/// The chances of (diffuse transmission, forward lobe, diffuse reflection, sheen); the reflection lobe has the rest.
 #[inline(always)]
-fn chances<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>) -> [R; 3] {
+fn chances<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>) -> [R; 4] {
     let cover = Sheet::gap(s, wo).one_minus().max(R::of(1e-6));
     let lobe = w[linear::K_T] * loss(s, wo).one_minus() * (least_cover(s) / cover);
-    [w[linear::T_D] + w[linear::K_T] - lobe, lobe, w[linear::R_D]]
+    let even = w[linear::T_D] + w[linear::K_T] - lobe;
+    [even, lobe, w[linear::R_D], w[linear::SHEEN]]
 }
 
 impl Sheet {
@@ -105,10 +108,11 @@ impl Sheet {
         s
     }
     /// Sampling weights that sum to 1, from the luminances of RGB factors (Rec. 709); the reflection lobe counts with
-    /// the mean of Schlick's reflectance, f0 + (1 - f0)/21.
+    /// the mean of Schlick's reflectance, f0 + (1 - f0)/21, the sheen with its own mean.
     pub fn weights(k: &[[f64; 3]; 8], s: &Shape<f64>) -> Linear<f64> {
         let mut lum = k.map(|c| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
         lum[linear::K_R] *= s[F0] + (1.0 - s[F0]) / 21.0;
+        lum[linear::SHEEN] *= fuzz::MEAN_ALBEDO;
         crate::model::normalized(&lum)
     }
 }
@@ -116,9 +120,10 @@ impl Sheet {
 impl Model for Sheet {
     const NAME: &'static str = "sheet";
     const EQUATION: &'static str = "T: c_l c_v t_d/(π c̄) + k_t [c0 (M(l,v') + (1-E_l)(1-E_v)/(π(1-Ē))) + (c_l-c0)(c_v-c0)/(π(c̄-c0))]; \
-        R: c_l c_v r_d/(π c̄) + min(c_l,c_v) k_r M_r(l,v) F(f0); c = 1 - openness, c0 at normal incidence, c̄ mean; gap: openness·δ";
+        R: c_l c_v r_d/(π c̄) + min(c_l,c_v) (k_r M_r(l,v) F(f0) + sheen S(l,v)); c = 1 - openness, c0 at normal incidence, c̄ mean; gap: openness·δ";
     const DOC: &'static str = "The woven sheet: openness of the weave as a delta apart, forward GGX lobe along the yarns with its masking \
-        loss given back, diffuse transmission, diffuse and glossy reflection. Energy-bounded and reciprocal by construction.";
+        loss given back, diffuse transmission, diffuse and glossy reflection, the sheen of standing fibres. Energy-bounded and \
+        reciprocal by construction.";
     const RECIPROCAL: bool = true;
     const PARAMS: &'static [Param] = &[
         Param::linear(
@@ -140,6 +145,12 @@ impl Model for Sheet {
             0.4,
         ),
         Param::linear("k_r", "strength of the reflection lobe", 1.0, 0.0),
+        Param::linear(
+            "sheen",
+            "strength of the sheen of standing fibres: 0 smooth yarn, 1 a layer of clear fibres on all of it",
+            1.0,
+            0.0,
+        ),
         Param::shape(
             "gamma_warp",
             "warp yarn diameter over pitch: 0.8 leaves a fifth open",
@@ -235,30 +246,35 @@ impl Model for Sheet {
             R::zero(),
         );
         b[linear::R_D] = R::select(through, R::zero(), diffuse);
-        b[linear::K_R] = R::select(through, R::zero(), cover_l.min(cover_v) * lobe * fresnel);
+        let both = cover_l.min(cover_v);
+        b[linear::K_R] = R::select(through, R::zero(), both * lobe * fresnel);
+        b[linear::SHEEN] = R::select(through, R::zero(), both * fuzz::lobe(lu, vu));
         b
     }
 
     #[inline(always)]
     fn pdf<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>, wi: Vec3<R>) -> R {
         let through = fold::transmits(wo, wi);
-        let [td, tl, rd] = chances(s, w, wo);
+        let [td, tl, rd, sheen] = chances(s, w, wo);
         let ax = R::select(through, s[ALPHA_X], s[RALPHA_X]);
         let ay = R::select(through, s[ALPHA_Y], s[RALPHA_Y]);
         let lobe = ggx::pdf(fold::up(wi), fold::up(wo), ax, ay);
         let cosine = wi.z.abs() * R::of(1.0 / PI);
-        R::select(through, td, rd) * cosine + R::select(through, tl, w[linear::K_R]) * lobe
+        let even = R::select(through, R::zero(), sheen * R::of(0.5 / PI));
+        R::select(through, td, rd) * cosine + R::select(through, tl, w[linear::K_R]) * lobe + even
     }
 
     #[inline(always)]
     fn sample<R: Real>(s: &Shape<R>, w: &Linear<R>, wo: Vec3<R>, u: [R; 3]) -> Vec3<R> {
-        let [td, tl, rd] = chances(s, w, wo);
+        let [td, tl, rd, sheen] = chances(s, w, wo);
         let diffuse = u[2].lt(td + rd);
         let through = u[2].lt(td) | (u[2].lt(td + rd + tl) & !diffuse);
         let ax = R::select(through, s[ALPHA_X], s[RALPHA_X]);
         let ay = R::select(through, s[ALPHA_Y], s[RALPHA_Y]);
         let lobe = ggx::sample(fold::up(wo), ax, ay, u[0], u[1]);
         let wi = Vec3::select(diffuse, warp::cosine(u[0], u[1]), lobe);
+        let fuzz = !u[2].lt(td + rd + tl) & u[2].lt(td + rd + tl + sheen);
+        let wi = Vec3::select(fuzz, warp::even(u[0], u[1]), wi);
         let there = fold::opposite(wo, wi);
         Vec3::select(through, there, Vec3::new(there.x, there.y, -there.z))
     }

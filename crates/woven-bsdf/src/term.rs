@@ -3,6 +3,7 @@
 pub mod albedo;
 pub mod beckmann;
 pub mod fresnel;
+pub mod fuzz;
 pub mod ggx;
 pub mod hg;
 pub mod power;

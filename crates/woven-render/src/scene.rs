@@ -9,6 +9,9 @@ pub mod gltf;
 pub mod sky;
 
 use glam::{Mat4, Vec2, Vec3};
+use std::sync::Arc;
+use woven_bsdf::measured::table::Tabulated;
+use woven_bsdf::weave::map::OpennessMap;
 
 /// Number of shape numbers of a sheet: its parameters, then the constants derived from them.
 pub const MAX_SHAPE: usize = 16;
@@ -76,16 +79,25 @@ pub struct Material {
     /// For messages and for `--fabric NAME=FILE`.
     pub name: String,
     /// Linear factors, RGB each: diffuse transmission t_d, forward lobe k_t, diffuse reflection r_d,
-    /// reflection lobe k_r, the rest 0. Shares of the light that hits the yarn.
+    /// reflection lobe k_r, sheen, the rest 0. Shares of the light that hits the yarn.
     pub linear: [[f32; 3]; MAX_LINEAR],
+    /// The same for a viewer on the side away from +z, where reflection has colours of its own there; transmission is
+    /// always that of `linear`.
+    pub back: Option<[[f32; 3]; MAX_LINEAR]>,
     /// Shape numbers of the sheet, derived constants included (see `woven_bsdf`'s sheet).
     pub shape: [f32; MAX_SHAPE],
+    /// A measured table that scatters and passes light instead of the sheet; `linear` is then what denoiser and path
+    /// choice take for its colour. See [`Material::measured`].
+    pub measured: Option<Arc<Tabulated>>,
     /// Radiance given off \[W/(sr m²)\], from the front, or from both sides if `double_sided`.
     pub emission: [f32; 3],
     /// Multiplies the factors `linear`.
     pub color_texture: Option<TextureUse>,
     /// Its alpha channel multiplies the coverage by yarn: gap = 1 - a (1 - openness).
     pub coverage_texture: Option<TextureUse>,
+    /// The alpha channel is the share that is woven as the sheet says instead, the rest being closed: gap = a openness.
+    /// See [`Texture::of_openness`].
+    pub multiplies: bool,
     /// With a cut-off, alpha below it is a hole and alpha above it is solid (glTF's MASK).
     pub alpha_cutoff: Option<f32>,
     /// Multiplies `emission`.
@@ -145,6 +157,29 @@ pub struct Texture {
     pub wrap_u: Wrap,
     /// Along v.
     pub wrap_v: Wrap,
+}
+
+impl Texture {
+    /// A map of openness as a texture for [`Material::coverage_texture`]: its holes cover nothing, or, for
+    /// [`Material::multiplies`], its alpha is the openness. One repeat is a unit of its coordinates.
+    #[must_use]
+    pub fn of_openness(name: &str, map: &OpennessMap, multiplies: bool) -> Self {
+        let [width, height] = map.size().map(|n| n as u32);
+        let alpha = |o: &f32| (255.0 * if multiplies { *o } else { 1.0 - o } + 0.5) as u8;
+        Self {
+            name: name.to_owned(),
+            width,
+            height,
+            pixels: map
+                .values()
+                .iter()
+                .map(|o| [255, 255, 255, alpha(o)])
+                .collect(),
+            srgb: false,
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+        }
+    }
 }
 
 /// A light without a surface of its own.
@@ -293,14 +328,27 @@ impl Material {
         Self {
             name: name.to_owned(),
             linear,
+            back: None,
             shape: crate::optics::constant_coverage(1.0 - gap),
+            measured: None,
             emission: [0.0; 3],
             color_texture: None,
             coverage_texture: None,
+            multiplies: false,
             alpha_cutoff: None,
             emission_texture: None,
             double_sided: false,
             layer: LAYER_LAMPS,
+        }
+    }
+
+    /// Cloth as it was measured.
+    #[must_use]
+    pub fn measured(name: &str, table: Tabulated) -> Self {
+        let [t, r] = table.means().map(|x| [x as f32; 3]);
+        Self {
+            measured: Some(Arc::new(table)),
+            ..Self::diffuse_sheet(name, r, t, 0.0)
         }
     }
 

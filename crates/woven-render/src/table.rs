@@ -3,175 +3,19 @@
 //! Layouts are `repr(C)` with the alignment of WGSL's storage buffers; `tests/parity_layout.rs` compares them with
 //! the offsets that naga computes from the shader's structs.
 
+mod check;
 mod lights;
+mod material;
+mod rows;
 mod sky;
 
 use anyhow::{Result, bail, ensure};
-use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 use crate::bvh::{Bvh, Corners, EMPTY, STACK};
-use crate::optics;
-use crate::scene::{
-    Camera, LAYERS, MAX_LINEAR, MAX_SHAPE, Material, Mesh, Scene, Texture, TextureUse, Wrap,
-};
+use crate::scene::{Camera, Mesh, Scene};
 
-/// No light, no texture.
-pub const NONE: u32 = u32::MAX;
-
-/// What shading needs of one triangle; row `i` belongs to place `i` of [`Bvh::order`].
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub struct Shade {
-    /// Shading normal of the first corner, then its u.
-    pub n0: [f32; 4],
-    /// Of the second corner.
-    pub n1: [f32; 4],
-    /// Of the third corner.
-    pub n2: [f32; 4],
-    /// Direction of the weft (dp/du), then nothing.
-    pub weft: [f32; 4],
-    /// v of the three corners, then nothing.
-    pub v: [f32; 4],
-    /// Row of the material.
-    pub material: u32,
-    /// Row of the light that this triangle is (part of), or [`NONE`].
-    pub light: u32,
-    /// Number of the mesh.
-    pub mesh: u32,
-    /// Number of the triangle in its mesh.
-    pub triangle: u32,
-}
-
-/// A material ready for use.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub struct MaterialRow {
-    /// Linear factors, RGB and nothing.
-    pub linear: [[f32; 4]; MAX_LINEAR],
-    /// Shape numbers.
-    pub shape: [f32; MAX_SHAPE],
-    /// Sampling weights of the linear factors.
-    pub weights: [f32; MAX_LINEAR],
-    /// Radiance, then the luminance of the sum of the linear factors.
-    pub emission: [f32; 4],
-    /// See the constants of this file.
-    pub flags: u32,
-    /// Light layer of the emission.
-    pub layer: u32,
-    /// Row of the colour texture or [`NONE`].
-    pub color_texture: u32,
-    /// Row of the coverage texture or [`NONE`].
-    pub coverage_texture: u32,
-    /// Row of the emission's texture or [`NONE`].
-    pub emission_texture: u32,
-    /// Alpha below it is a hole; negative: alpha is coverage.
-    pub alpha_cutoff: f32,
-    /// Gap that is the same everywhere and in every direction, or negative.
-    pub gap: f32,
-    /// Cover by yarn in every direction, where [`EVEN`].
-    pub cover: f32,
-}
-
-/// [`MaterialRow::flags`]: no lobes, diffuse terms only.
-pub const MATT: u32 = 1;
-/// [`MaterialRow::flags`]: emits on both sides.
-pub const DOUBLE_SIDED: u32 = 2;
-/// [`MaterialRow::flags`]: some light passes through (transmission, not the gap).
-pub const TRANSMITS: u32 = 4;
-/// [`MaterialRow::flags`]: emits.
-pub const EMITS: u32 = 8;
-/// [`MaterialRow::flags`]: the same cover in every direction.
-pub const EVEN: u32 = 16;
-
-/// A texture and how to reach it.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub struct TextureRow {
-    /// First row of the affine map of (u, v, 1), then nothing.
-    pub map_u: [f32; 4],
-    /// Second row.
-    pub map_v: [f32; 4],
-    /// First texel.
-    pub first: u32,
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Bits 0-1 wrap of u (0 repeat, 1 mirror, 2 clamp), bits 2-3 of v, bit 4 sRGB.
-    pub flags: u32,
-}
-
-/// [`LightRow::kind`]: a rectangle.
-pub const RECT: u32 = 0;
-/// [`LightRow::kind`]: a triangle.
-pub const TRIANGLE: u32 = 1;
-/// [`LightRow::kind`]: a disc at infinity.
-pub const SUN: u32 = 2;
-/// [`LightRow::kind`]: a point.
-pub const POINT: u32 = 3;
-/// [`LightRow::kind`]: a cone from a point.
-pub const SPOT: u32 = 4;
-/// [`LightRow::kind`]: the environment.
-pub const SKY: u32 = 5;
-/// [`LightRow::kind`]: a window; these rows come after the lights.
-pub const PORTAL: u32 = 6;
-
-/// A light (or a window).
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub struct LightRow {
-    /// Corner, or place of a point.
-    pub p: [f32; 3],
-    /// Which of the kinds above.
-    pub kind: u32,
-    /// First edge; sun: cos and sin of the angular radius.
-    pub u: [f32; 3],
-    /// Light layer.
-    pub layer: u32,
-    /// Second edge; spot: cos of the inner and outer angle.
-    pub v: [f32; 3],
-    /// A triangle of it, for its texture, or [`NONE`].
-    pub place: u32,
-    /// Unit normal of the front; sun: direction to it; spot: its axis.
-    pub n: [f32; 3],
-    /// Area \[m²\]; for a rectangle that is not one (a parallelogram) negative.
-    pub area: f32,
-    /// Radiance; sun: irradiance; point and spot: intensity.
-    pub radiance: [f32; 3],
-    /// Share of the choice when lights are chosen by power, summed up to and including this row.
-    pub cumulative: f32,
-}
-
-/// Numbers of the scene that are not rows.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub struct Globals {
-    /// Multiplies the environment's pixels, then its mean luminance.
-    pub sky_scale: [f32; 4],
-    /// Rows of lights.
-    pub lights: u32,
-    /// Rows of portals, after the lights.
-    pub portals: u32,
-    /// Columns of the environment, 0 without one.
-    pub sky_width: u32,
-    /// Rows of the environment.
-    pub sky_height: u32,
-    /// cos and sin of the environment's rotation.
-    pub sky_turn: [f32; 2],
-    /// Share of environment samples through the portals, the rest by the picture.
-    pub portal_share: f32,
-    /// Row of the environment among the lights, or [`NONE`].
-    pub sky_light: u32,
-    /// Layer of the environment.
-    pub sky_layer: u32,
-    /// Some light is sampled so that scattering must meet it too (triangles, see `cpu/light.rs`).
-    pub soft_lights: u32,
-    /// Scale of the offset that keeps a ray off the surface it leaves [m].
-    pub offset: f32,
-    /// 4, the taps of a bilinear texture: a loop bound that shader compilers do not know.
-    pub taps: u32,
-}
+pub use rows::*;
 
 /// The whole table.
 #[derive(Clone, Debug)]
@@ -184,7 +28,7 @@ pub struct Table {
     pub materials: Vec<MaterialRow>,
     /// Uses of textures.
     pub textures: Vec<TextureRow>,
-    /// RGBA, 8 bits each, red lowest.
+    /// RGBA, 8 bits each, red lowest; and the words of measured tables.
     pub texels: Vec<u32>,
     /// Lights, then portals.
     pub lights: Vec<LightRow>,
@@ -209,12 +53,12 @@ impl Table {
     /// # Errors
     /// A sentence when the scene names what is not there or has numbers that are not finite.
     pub fn new(scene: &Scene, light_layers: bool) -> Result<Self> {
-        check(scene)?;
-        let mut textures = Textures::default();
+        check::check(scene)?;
+        let mut textures = material::Textures::default();
         let materials: Vec<MaterialRow> = scene
             .materials
             .iter()
-            .map(|m| material_row(m, &mut textures, scene, light_layers))
+            .map(|m| material::row(m, &mut textures, scene, light_layers))
             .collect();
         let mut corners = Vec::new();
         let mut owners = Vec::new();
@@ -386,189 +230,4 @@ fn shade_row(mesh: &Mesh, t: usize) -> Shade {
         mesh: 0,
         triangle: t as u32,
     }
-}
-
-fn material_row(
-    m: &Material,
-    textures: &mut Textures,
-    scene: &Scene,
-    light_layers: bool,
-) -> MaterialRow {
-    let sum = |c: usize| m.linear.iter().map(|k| k[c]).sum::<f32>();
-    let albedo = crate::cpu::math::luminance(Vec3::new(sum(0), sum(1), sum(2)));
-    let black = |j: usize| m.linear[j].iter().all(|&k| k <= 0.0);
-    let even = m.shape[2] == 0.0 || (m.shape[0] == 0.0 && m.shape[1] == 0.0);
-    let mut flags = 0;
-    let mut set = |on: bool, flag: u32| flags |= if on { flag } else { 0 };
-    set(black(1) && black(3), MATT);
-    set(m.double_sided, DOUBLE_SIDED);
-    set(!black(0) || !black(1), TRANSMITS);
-    set(m.emission.iter().any(|&e| e > 0.0), EMITS);
-    set(even, EVEN);
-    MaterialRow {
-        linear: m.linear.map(|k| [k[0], k[1], k[2], 0.0]),
-        shape: m.shape,
-        weights: optics::weights(&m.linear, &m.shape),
-        emission: [m.emission[0], m.emission[1], m.emission[2], albedo],
-        flags,
-        layer: if light_layers {
-            m.layer.min(LAYERS as u32 - 1)
-        } else {
-            0
-        },
-        color_texture: textures.row(m.color_texture, scene),
-        coverage_texture: textures.row(m.coverage_texture, scene),
-        emission_texture: textures.row(m.emission_texture, scene),
-        alpha_cutoff: m.alpha_cutoff.unwrap_or(-1.0),
-        gap: if even && m.coverage_texture.is_none() {
-            optics::openness(&m.shape, Vec3::Z).clamp(0.0, 1.0)
-        } else {
-            -1.0
-        },
-        cover: 1.0 - optics::openness(&m.shape, Vec3::Z).clamp(0.0, 1.0),
-    }
-}
-
-/// Textures are copied once each, however often they are used.
-#[derive(Default)]
-struct Textures {
-    rows: Vec<TextureRow>,
-    texels: Vec<u32>,
-    /// (number in the scene, first texel)
-    there: Vec<(usize, u32)>,
-}
-
-impl Textures {
-    fn row(&mut self, used: Option<TextureUse>, scene: &Scene) -> u32 {
-        let Some(used) = used else { return NONE };
-        let texture = &scene.textures[used.texture];
-        let first = match self.there.iter().find(|t| t.0 == used.texture) {
-            Some(&(_, first)) => first,
-            None => {
-                let first = self.texels.len() as u32;
-                self.texels
-                    .extend(texture.pixels.iter().map(|&p| u32::from_le_bytes(p)));
-                self.there.push((used.texture, first));
-                first
-            }
-        };
-        let wrap = |w: Wrap| match w {
-            Wrap::Repeat => 0,
-            Wrap::Mirror => 1,
-            Wrap::Clamp => 2,
-        };
-        let [[a, b, c], [d, e, f]] = used.transform;
-        self.rows.push(TextureRow {
-            map_u: [a, b, c, 0.0],
-            map_v: [d, e, f, 0.0],
-            first,
-            width: texture.width,
-            height: texture.height,
-            flags: wrap(texture.wrap_u) | wrap(texture.wrap_v) << 2 | u32::from(texture.srgb) << 4,
-        });
-        self.rows.len() as u32 - 1
-    }
-}
-
-/// Everything that is named is there, every number is finite.
-fn check(scene: &Scene) -> Result<()> {
-    for mesh in &scene.meshes {
-        let n = mesh.positions.len();
-        let name = &mesh.name;
-        ensure!(
-            mesh.material < scene.materials.len(),
-            "mesh \"{name}\" names material {}, but the scene has {}",
-            mesh.material,
-            scene.materials.len()
-        );
-        ensure!(
-            mesh.indices.iter().flatten().all(|&i| (i as usize) < n),
-            "mesh \"{name}\" names a vertex beyond its {n}"
-        );
-        ensure!(
-            (mesh.normals.is_empty() || mesh.normals.len() == n)
-                && (mesh.uvs.is_empty() || mesh.uvs.len() == n),
-            "mesh \"{name}\" has {n} positions, {} normals and {} texture coordinates; the numbers must agree",
-            mesh.normals.len(),
-            mesh.uvs.len()
-        );
-        let finite = mesh
-            .positions
-            .iter()
-            .chain(&mesh.normals)
-            .all(|p| p.is_finite() && p.abs().max_element() < 1e9)
-            && mesh.uvs.iter().all(|t| t.is_finite());
-        ensure!(
-            finite,
-            "mesh \"{name}\" has a coordinate that is not a number or beyond 1e9 m"
-        );
-    }
-    for m in &scene.materials {
-        let finite = m
-            .linear
-            .iter()
-            .flatten()
-            .chain(&m.shape)
-            .chain(&m.emission)
-            .all(|x| x.is_finite());
-        let positive = m
-            .linear
-            .iter()
-            .flatten()
-            .chain(&m.emission)
-            .all(|&x| x >= 0.0);
-        ensure!(
-            finite && positive,
-            "material \"{}\" has a factor that is negative or not a number",
-            m.name
-        );
-        for used in [m.color_texture, m.coverage_texture, m.emission_texture]
-            .into_iter()
-            .flatten()
-        {
-            ensure!(
-                used.texture < scene.textures.len(),
-                "material \"{}\" names texture {}, but the scene has {}",
-                m.name,
-                used.texture,
-                scene.textures.len()
-            );
-        }
-    }
-    let whole = |t: &Texture| {
-        t.width > 0 && t.height > 0 && t.pixels.len() == t.width as usize * t.height as usize
-    };
-    if let Some(t) = scene.textures.iter().find(|t| !whole(t)) {
-        bail!(
-            "texture \"{}\" says {} x {} but has {} pixels",
-            t.name,
-            t.width,
-            t.height,
-            t.pixels.len()
-        );
-    }
-    if let Some(e) = &scene.environment {
-        ensure!(
-            e.width > 0 && e.height > 0 && e.pixels.len() == e.width as usize * e.height as usize,
-            "the environment says {} x {} but has {} pixels",
-            e.width,
-            e.height,
-            e.pixels.len()
-        );
-        ensure!(
-            e.pixels
-                .iter()
-                .flatten()
-                .all(|&x| x.is_finite() && x >= 0.0)
-                && e.scale.iter().all(|&x| x >= 0.0),
-            "the environment has a pixel that is negative or not a number"
-        );
-    }
-    let c = &scene.camera;
-    ensure!(
-        c.transform.is_finite() && c.vfov > 1e-4 && c.vfov < 3.1 && c.aperture_radius >= 0.0,
-        "the camera's matrix must be finite and its vertical angle between 0.0001 and 3.1 rad; it is {}",
-        c.vfov
-    );
-    Ok(())
 }

@@ -5,14 +5,20 @@
 
 mod common;
 
-use common::{backends, curtain_room, furnace, mean, picture};
+use common::{backends, curtain_room, furnace, mean, picture, quad};
 use glam::Vec3;
+use woven_bsdf::measured::klems::Klems;
+use woven_bsdf::measured::table::Tabulated;
 use woven_bsdf::model::Model;
+use woven_bsdf::vec3::Vec3 as Direction;
+use woven_bsdf::weave::draft::Draft;
+use woven_bsdf::weave::map::OpennessMap;
+use woven_bsdf::weave::yarns::{Gauge, Yarns};
 use woven_render::compare::Picture;
 use woven_render::film::Film;
 use woven_render::render::{Backend, Integrator, Settings};
 use woven_render::scene::{
-    Environment, LAYER_SKY, LAYER_SUN, Light, Material, Scene, Texture, TextureUse, Wrap,
+    Camera, Environment, LAYER_SKY, LAYER_SUN, Light, Material, Scene, Texture, TextureUse, Wrap,
 };
 
 /// A sheet with all its parts: weave, forward lobe, reflection.
@@ -232,4 +238,171 @@ fn furnace_of_the_woven_sheet() {
     scene.portals.clear();
     scene.environment = Some(furnace());
     compare("furnace", &scene, &settings(8), PIXELS, MEANS);
+}
+
+fn goniometer() -> Tabulated {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../assets/measurements/mecho_6216_goniometer.xml");
+    let file = Klems::read(&file).unwrap_or_else(|e| panic!("{e}"));
+    Tabulated::new(&file, "Visible").unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A measured cloth is all edges of patches: where a rounding puts a direction on the other side, the sample differs.
+#[test]
+fn measured_cloth() {
+    let scene = curtain_room(Material::measured("shade", goniometer()), 60);
+    compare("measured curtain", &scene, &settings(8), 0.95, MEANS);
+}
+
+#[test]
+fn a_measured_cloth_in_a_furnace_shows_its_albedo() {
+    let table = goniometer();
+    for (theta, phi) in [(0.0, 0.0), (0.6, 1.1), (1.1, 4.0), (2.6, 0.3)] {
+        let to_eye = Direction::from_angles(theta, phi);
+        let eye = Vec3::new(to_eye.x as f32, to_eye.y as f32, to_eye.z as f32) * 4.0;
+        let scene = Scene {
+            materials: vec![Material::measured("shade", table.clone())],
+            // The weft runs along x, the warp along y.
+            meshes: vec![quad(
+                "sheet",
+                Vec3::new(-2.0, -2.0, 0.0),
+                Vec3::X * 4.0,
+                Vec3::Y * 4.0,
+                0,
+            )],
+            environment: Some(furnace()),
+            // So narrow that the whole picture lies in one patch.
+            camera: Camera::look_at(eye, Vec3::ZERO, Vec3::new(0.1, 1.0, 0.2), 0.01),
+            ..Scene::default()
+        };
+        let want = table.albedo(to_eye) + table.gap(-to_eye);
+        for backend in backends() {
+            let got = mean(&picture(&scene, &settings(16), backend))[1];
+            eprintln!("{backend:?} {theta} {phi}: {got:.6} of {want:.6}");
+            // The sampler's weight is the albedo itself: no noise is left.
+            assert!((got / want - 1.0).abs() < 0.01, "{backend:?}: {got} {want}");
+        }
+    }
+}
+
+/// A lace of yarns as a map over a closed ground, and as the share that is woven openly.
+#[test]
+fn maps_of_openness() {
+    let gauge = Gauge {
+        diameter: 0.28,
+        pitch: 0.4,
+    };
+    let yarns = Yarns::new(&Draft::lace(), gauge, gauge, 0.5).gathered(3, 0.5);
+    let map = OpennessMap::of_yarns(&yarns, 4);
+    for multiplies in [false, true] {
+        let mut scene = curtain_room(lace(), 60);
+        scene
+            .textures
+            .push(Texture::of_openness("lace", &map, multiplies));
+        scene.materials[3].coverage_texture = Some(TextureUse {
+            texture: 0,
+            transform: [[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]],
+        });
+        scene.materials[3].multiplies = multiplies;
+        compare("map of openness", &scene, &settings(8), PIXELS, MEANS);
+    }
+}
+
+/// What a sheet with a map gives back of an even light, and what passes, is what its parts do.
+#[test]
+fn a_map_of_openness_keeps_the_light() {
+    let picture_of = |material: Material, even: f32| {
+        let mut scene = Scene {
+            materials: vec![material],
+            meshes: vec![quad(
+                "sheet",
+                Vec3::new(-2.0, -2.0, 0.0),
+                Vec3::X * 4.0,
+                Vec3::Y * 4.0,
+                0,
+            )],
+            environment: Some(furnace()),
+            camera: Camera::look_at(Vec3::new(1.0, 0.5, 2.0), Vec3::ZERO, Vec3::Y, 0.1),
+            ..Scene::default()
+        };
+        let map = OpennessMap::new(1, 1, vec![even]).expect("a map");
+        scene
+            .textures
+            .push(Texture::of_openness("even", &map, true));
+        scene.materials[0].coverage_texture = Some(TextureUse::plain(0));
+        scene.materials[0].multiplies = true;
+        backends()
+            .into_iter()
+            .map(|b| mean(&picture(&scene, &settings(256), b))[1])
+            .collect::<Vec<_>>()
+    };
+    // Nothing absorbs: 1 comes through or back, however much of the ground is closed.
+    let mut s = [0.0; 16];
+    s[..8].copy_from_slice(&[0.5, 0.42, 0.7, 0.22, 0.15, 0.4, 0.3, 0.04]);
+    woven_bsdf::sheet::Sheet::derive(&mut s);
+    let mut white = Material::diffuse_sheet("white", [0.6; 3], [0.4; 3], 0.0);
+    white.shape = s.map(|x: f64| x as f32);
+    for even in [0.0, 0.4, 1.0] {
+        for got in picture_of(white.clone(), even) {
+            assert!((got - 1.0).abs() < 0.01, "{even}: {got}");
+        }
+    }
+}
+
+#[test]
+fn the_back_has_colours_of_its_own() {
+    let mut cloth = lace();
+    let mut back = cloth.linear;
+    back[2] = [0.05, 0.3, 0.6];
+    back[3] = [0.6, 0.1, 0.1];
+    back[4] = [0.1, 0.05, 0.0];
+    cloth.linear[4] = [0.0, 0.1, 0.05];
+    cloth.back = Some(back);
+    let seen_from = |z: f32, cloth: &Material| Scene {
+        materials: vec![cloth.clone()],
+        meshes: vec![quad(
+            "sheet",
+            Vec3::new(-2.0, -2.0, 0.0),
+            Vec3::X * 4.0,
+            Vec3::Y * 4.0,
+            0,
+        )],
+        lights: [1.0, -1.0]
+            .map(|z| Light::Point {
+                position: Vec3::new(0.4, 0.3, 2.0 * z),
+                intensity: [5.0; 3],
+                layer: 2,
+            })
+            .to_vec(),
+        camera: Camera::look_at(Vec3::new(0.3, 0.5, 3.0 * z), Vec3::ZERO, Vec3::Y, 0.4),
+        ..Scene::default()
+    };
+    for z in [1.0, -1.0] {
+        compare(
+            "two sides",
+            &seen_from(z, &cloth),
+            &settings(4),
+            PIXELS,
+            MEANS,
+        );
+    }
+    // The back of the cloth is the front of one that is dyed the other way round.
+    let turned = Material {
+        linear: back,
+        back: None,
+        ..cloth.clone()
+    };
+    for backend in backends() {
+        let [a, b, front] = [
+            seen_from(-1.0, &cloth),
+            seen_from(-1.0, &turned),
+            seen_from(1.0, &cloth),
+        ]
+        .map(|s| mean(&picture(&s, &settings(4), backend)));
+        assert!(
+            a.iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < 1e-6),
+            "{a:?} {b:?}"
+        );
+        assert!(front[0] > 1.5 * a[0] && front[2] < a[2], "{front:?} {a:?}");
+    }
 }

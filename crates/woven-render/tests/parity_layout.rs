@@ -66,7 +66,9 @@ fn rows_lie_where_the_shader_reads_them() {
         emission_texture,
         alpha_cutoff,
         gap,
-        cover
+        cover,
+        measured,
+        unused
     );
     same!(
         m, LightRow, p, kind, u, layer, v, place, n, area, radiance, cumulative

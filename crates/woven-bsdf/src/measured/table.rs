@@ -1,7 +1,8 @@
 //! Measured cloth rendered as it was measured: a Klems table as a BSDF, with the straight-through peak kept apart.
 //!
 //! The value is constant over each pair of patches. What the straight-through patch holds above its neighbours is the
-//! gap, a delta like [`crate::sheet::Sheet::gap`]; the rest is the floor and the skirt. Runs on the CPU only.
+//! gap, a delta like [`crate::sheet::Sheet::gap`]; the rest is the floor and the skirt. [`Tabulated::packed`] is the same for a
+//! renderer in single precision, on CPU and GPU.
 
 use super::Refused;
 use super::klems::{Kind, Klems, Patch};
@@ -72,6 +73,50 @@ impl Tabulated {
         };
         out.sums = [0, 1].map(|viewer| out.running_sums(viewer));
         Ok(out)
+    }
+
+    /// The table for a renderer: 32-bit words, of which all but the counts are bits of `f32`. With n patches in r rings:
+    ///
+    /// | words | what |
+    /// |---|---|
+    /// | 0, 1 | n, r |
+    /// | 2 + 3 i … | ring i: sin² of its greatest θ, its first patch, how many it has (their centres from φ = 0 on) |
+    /// | then 4 n² | f in 1/sr by side of the light, transmission or reflection, outgoing and incident patch |
+    /// | then 2 n | gap by side of the light and incident patch |
+    /// | then 4 n² | running sums of f·Ω by side of the viewer, outgoing patch and incident patch (n of the other side first) |
+    ///
+    /// Light comes in a patch by the way it travels; see [`super::klems`].
+    pub fn packed(&self) -> Vec<u32> {
+        let n = self.patches.len();
+        let bits = |x: f64| (x as f32).to_bits();
+        let mut out = vec![n as u32, self.rings.len() as u32 - 1];
+        for ring in self.rings.windows(2) {
+            let edge = self.patches[ring[0]].theta_hi.sin().powi(2);
+            out.extend([bits(edge), ring[0] as u32, (ring[1] - ring[0]) as u32]);
+        }
+        let numbers = self
+            .tables
+            .iter()
+            .flatten()
+            .chain(&self.gaps)
+            .chain(&self.sums);
+        out.extend(numbers.flatten().map(|x| bits(*x)));
+        out
+    }
+
+    /// Mean share of an even light that is scattered through, and back: the two sides' mean.
+    pub fn means(&self) -> [f64; 2] {
+        let n = self.patches.len();
+        let mut out = [0.0; 2];
+        for sums in &self.sums {
+            for (o, p) in self.patches.iter().enumerate() {
+                let row = &sums[o * 2 * n..][..2 * n];
+                let share = p.projected_solid_angle() / std::f64::consts::TAU;
+                out[0] += share * row[n - 1];
+                out[1] += share * (row[2 * n - 1] - row[n - 1]);
+            }
+        }
+        out
     }
 
     fn running_sums(&self, viewer: usize) -> Vec<f64> {

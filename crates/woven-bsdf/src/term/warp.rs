@@ -1,6 +1,7 @@
 //! From the unit square to directions.
 
 use crate::real::Real;
+use crate::term::power;
 use crate::vec3::Vec3;
 use std::f64::consts::PI;
 
@@ -10,6 +11,15 @@ pub fn cosine<R: Real>(u1: R, u2: R) -> Vec3<R> {
     let r = u1.pos().sqrt_pos();
     let phi = u2 * R::of(2.0 * PI);
     Vec3::new(r * phi.cos(), r * phi.sin(), u1.one_minus().sqrt_pos())
+}
+
+/// A direction of the upper hemisphere with density 1/2π: all of them alike.
+#[inline(always)]
+pub fn even<R: Real>(u1: R, u2: R) -> Vec3<R> {
+    let phi = u2 * R::of(2.0 * PI);
+    // z = 1 - u1, its sine from what it lacks of 1.
+    let r = power::sine(u1);
+    Vec3::new(r * phi.cos(), r * phi.sin(), u1.one_minus())
 }
 
 /// The direction at the angle with cosine `cos` from the unit vector `axis`, turned by `u` of a full turn about it.

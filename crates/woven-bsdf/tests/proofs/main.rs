@@ -14,6 +14,7 @@ mod readers;
 mod reciprocity;
 mod rgl;
 mod sampling;
+mod sheen;
 mod shop;
 mod support;
 mod table;

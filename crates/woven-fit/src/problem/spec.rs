@@ -55,6 +55,8 @@ pub struct Spec {
 const DIFFUSE: [&str; 4] = ["k_d", "c", "t_d", "r_d"];
 /// Parameters of `sheet` that only reflection sees.
 const REFLECTION: [&str; 5] = ["r_d", "k_r", "ralpha_x", "ralpha_y", "f0"];
+/// Reflection too, but a goniometer of a few angles cannot tell it from the lobe: it keeps the value 0.
+const SHEEN: &str = "sheen";
 /// Parameters that make the gap.
 pub const GAP: [&str; 3] = ["gamma_warp", "gamma_weft", "section"];
 
@@ -63,7 +65,7 @@ impl Spec {
     pub fn transmission(model: &'static ModelInfo, diffuse: bool, gap: bool) -> Self {
         let own_gap = model.params.iter().any(|p| p.name == GAP[0]);
         let skip = |name: &str| {
-            (own_gap && REFLECTION.contains(&name))
+            (own_gap && (REFLECTION.contains(&name) || name == SHEEN))
                 || (!diffuse && DIFFUSE.contains(&name))
                 || (own_gap && !gap && GAP.contains(&name))
         };

@@ -128,11 +128,11 @@ pub(super) struct Incident {
 impl Incident {
     /// What is scattered towards `wo` (in the sheet's frame).
     #[inline(always)]
-    pub(super) fn scattered(&self, m: &MaterialRow, s: &Surface, wo: Vec3) -> Vec3 {
+    pub(super) fn scattered(&self, table: &Table, m: &MaterialRow, s: &Surface, wo: Vec3) -> Vec3 {
         let wi = s.local(self.wi);
-        let mut value = surface::evaluate(m, s, wi, wo) * self.light;
+        let mut value = surface::evaluate(table, m, s, wi, wo) * self.light;
         if self.pdf > 0.0 {
-            value *= heuristic(self.pdf, surface::density(m, wo, wi));
+            value *= heuristic(self.pdf, surface::density(table, m, wo, wi));
         }
         value
     }
@@ -160,7 +160,7 @@ fn incident(
         },
         layer: l.layer,
     };
-    let value = found.scattered(m, s, wo);
+    let value = found.scattered(table, m, s, wo);
     if value.max_element() <= 0.0 {
         return None;
     }
@@ -217,7 +217,7 @@ pub(super) fn begin(
         let s = surface::surface(table, &hit);
         let m = &table.materials[s.material as usize];
         let wo = s.local(-ray.d);
-        let gap = surface::gap(m, &s, ray.d);
+        let gap = surface::gap(table, m, &s, ray.d);
         add(
             &mut out.light,
             m.layer,
@@ -228,7 +228,7 @@ pub(super) fn begin(
             out.normal = towards_eye(&s, ray.d);
             out.depth = hit.t;
         }
-        out.albedo += reflectance(m, &s) * (passed * (1.0 - gap));
+        out.albedo += reflectance(m, &s, wo) * (passed * (1.0 - gap));
         let weight = passed * (1.0 - gap) * albedo;
         if weight > 0.0 && view.depth > 0 {
             let at = place(table, m, &s, ray.d);
@@ -278,11 +278,11 @@ pub(super) fn begin(
     }
 }
 
-fn reflectance(m: &MaterialRow, s: &Surface) -> Vec3 {
-    m.linear
-        .iter()
-        .fold(Vec3::ZERO, |sum, k| sum + Vec3::new(k[0], k[1], k[2]))
-        * s.tint
+/// Sum of the factors on the side of `wo`.
+fn reflectance(m: &MaterialRow, s: &Surface, wo: Vec3) -> Vec3 {
+    let back = surface::side(wo);
+    let k = |j: usize| Vec3::new(m.linear[j][0], m.linear[j][1], m.linear[j][2]);
+    (k(0) + k(1) + k(2 + back) + k(3 + back) + k(4 + back)) * s.tint
 }
 
 #[inline(always)]
@@ -312,12 +312,12 @@ fn follow(
             return second;
         }
         let u = rng.set(2 * bounce);
-        let wi = surface::sample(m, v.wo, Vec3::new(u[0], u[1], u[2]));
-        let pdf = surface::density(m, v.wo, wi);
+        let wi = surface::sample(table, m, v.wo, Vec3::new(u[0], u[1], u[2]));
+        let pdf = surface::density(table, m, v.wo, wi);
         if pdf <= 1e-12 {
             return second;
         }
-        let f = surface::evaluate(m, &v.s, wi, v.wo);
+        let f = surface::evaluate(table, m, &v.s, wi, v.wo);
         v.throughput *= f * (wi.z.abs() / pdf);
         // Russian roulette by what the path still carries.
         let q = v.throughput.max_element() * ROULETTE;
@@ -366,7 +366,7 @@ fn follow(
                 return second;
             };
             let s = surface::surface(table, &hit);
-            let gap = surface::gap(&table.materials[s.material as usize], &s, d);
+            let gap = surface::gap(table, &table.materials[s.material as usize], &s, d);
             if gap <= 0.0 || (gap < 1.0 && rng.coin() >= gap) {
                 break (hit, s, gap);
             }

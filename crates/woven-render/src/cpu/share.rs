@@ -117,8 +117,8 @@ fn gather(table: &Table, group: &mut [Option<Begun>; GROUP], coins: &[f32; GROUP
             let carry = sight.carry * (1.0 / (q * all));
             let wo = y.s.local(-sight.d);
             let light = &mut b.sample.light;
-            light[y.lit.layer as usize] += y.lit.scattered(m, &y.s, wo) * carry;
-            let f = surface::evaluate(m, &y.s, y.s.local(y.wi), wo) * carry;
+            light[y.lit.layer as usize] += y.lit.scattered(table, m, &y.s, wo) * carry;
+            let f = surface::evaluate(table, m, &y.s, y.s.local(y.wi), wo) * carry;
             for (sum, &beyond) in light.iter_mut().zip(&y.beyond) {
                 *sum += f * beyond;
             }
@@ -145,8 +145,8 @@ fn look(table: &Table, x: &Vertex, y: &Second, side: bool, own: bool) -> Sight {
     }
     let m = &table.materials[x.s.material as usize];
     let wi = x.s.local(d);
-    let yarn = 1.0 - surface::gap(&table.materials[y.s.material as usize], &y.s, d);
-    let density = surface::density(m, x.wo, wi) * yarn;
+    let yarn = 1.0 - surface::gap(table, &table.materials[y.s.material as usize], &y.s, d);
+    let density = surface::density(table, m, x.wo, wi) * yarn;
     if density <= 0.0 {
         return Sight::default();
     }
@@ -162,7 +162,7 @@ fn look(table: &Table, x: &Vertex, y: &Second, side: bool, own: bool) -> Sight {
     let seen = cos.abs() / distance2 * passed;
     Sight {
         density: density * seen,
-        carry: x.throughput * surface::evaluate(m, &x.s, wi, x.wo) * (wi.z.abs() * seen),
+        carry: x.throughput * surface::evaluate(table, m, &x.s, wi, x.wo) * (wi.z.abs() * seen),
         d,
     }
 }

@@ -5,8 +5,13 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::bvh::Hit;
 use super::math::sincos_turn;
+use super::measured;
 use crate::optics;
-use crate::table::{DOUBLE_SIDED, EMITS, EVEN, MATT, MaterialRow, NONE, Table, TextureRow};
+use woven_bsdf::sheet::shape::{GAMMA_WARP, INV_MEAN_COVER};
+
+use crate::table::{
+    DOUBLE_SIDED, EMITS, EVEN, MATT, MEASURED, MULTIPLIES, MaterialRow, NONE, Table, TextureRow,
+};
 
 /// A point of a sheet, seen along a ray.
 #[derive(Clone, Copy, Debug)]
@@ -132,14 +137,33 @@ pub(crate) fn surface(table: &Table, hit: &Hit) -> Surface {
     }
 }
 
+/// Openness of the sheet along `w`, by its weave or its table.
+#[inline(always)]
+fn open_along(table: &Table, m: &MaterialRow, w: Vec3) -> f32 {
+    if m.flags & MEASURED != 0 {
+        return measured::gap(table, m.measured, w);
+    }
+    optics::openness(&m.shape, w)
+}
+
+/// The gap of a sheet with this openness under a coverage texture.
+#[inline(always)]
+fn covered(m: &MaterialRow, alpha: f32, open: f32) -> f32 {
+    let gap = if m.flags & MULTIPLIES != 0 {
+        alpha * open
+    } else {
+        1.0 - alpha * (1.0 - open)
+    };
+    gap.clamp(0.0, 1.0)
+}
+
 /// Share of the light along `d` that passes straight through the sheet.
 #[inline(always)]
-pub(crate) fn gap(material: &MaterialRow, s: &Surface, d: Vec3) -> f32 {
+pub(crate) fn gap(table: &Table, material: &MaterialRow, s: &Surface, d: Vec3) -> f32 {
     if material.gap >= 0.0 {
         return material.gap;
     }
-    let open = optics::openness(&material.shape, s.local(d));
-    (1.0 - s.alpha * (1.0 - open)).clamp(0.0, 1.0)
+    covered(material, s.alpha, open_along(table, material, s.local(d)))
 }
 
 /// The same for a triangle that a shadow ray along `d` meets at barycentric (u, v).
@@ -150,7 +174,7 @@ pub(crate) fn gap_at(table: &Table, place: u32, u: f32, v: f32, d: Vec3) -> f32 
     if material.coverage_texture != NONE {
         alpha = coverage(table, material, uv_at(table, place, u, v));
         if alpha <= 0.0 {
-            return 1.0;
+            return covered(material, 0.0, 1.0);
         }
     }
     let mut local = Vec3::Z;
@@ -162,8 +186,7 @@ pub(crate) fn gap_at(table: &Table, place: u32, u: f32, v: f32, d: Vec3) -> f32 
         let [x, y, z] = frame(table, place, u, v, ng);
         local = Vec3::new(d.dot(x), d.dot(y), d.dot(z));
     }
-    let open = optics::openness(&material.shape, local);
-    (1.0 - alpha * (1.0 - open)).clamp(0.0, 1.0)
+    covered(material, alpha, open_along(table, material, local))
 }
 
 /// Coverage by the texture's alpha.
@@ -272,31 +295,58 @@ pub(crate) fn emission_at(table: &Table, place: u32, u: f32, v: f32) -> Vec3 {
     e * Vec3::new(c[0], c[1], c[2])
 }
 
+/// Rows of the factors for diffuse reflection, reflection lobe and sheen, less 2, on the side of `w`.
+#[inline(always)]
+pub(crate) fn side(w: Vec3) -> usize {
+    if w.z < 0.0 { 3 } else { 0 }
+}
+
 /// f(wi, wo), both in the sheet's frame.
 #[inline(always)]
-pub(crate) fn evaluate(m: &MaterialRow, s: &Surface, wi: Vec3, wo: Vec3) -> Vec3 {
+pub(crate) fn evaluate(table: &Table, m: &MaterialRow, s: &Surface, wi: Vec3, wo: Vec3) -> Vec3 {
     let k = |j: usize| Vec3::new(m.linear[j][0], m.linear[j][1], m.linear[j][2]);
+    let back = side(wo);
     let scale = s.tint * s.alpha;
     if m.flags & (MATT | EVEN) == MATT | EVEN {
-        let j = if wi.z * wo.z < 0.0 { 0 } else { 2 };
+        let j = if wi.z * wo.z < 0.0 { 0 } else { 2 + back };
         return k(j) * scale * (m.cover * FRAC_1_PI);
     }
-    let b = optics::sheet_basis(&m.shape, wi, wo);
-    (k(0) * b[0] + k(1) * b[1] + k(2) * b[2] + k(3) * b[3]) * scale
+    if m.flags & MEASURED != 0 {
+        return scale * measured::evaluate(table, m.measured, wi, wo);
+    }
+    let value = |shape: &[f32; crate::scene::MAX_SHAPE]| {
+        let b = optics::sheet_basis(shape, wi, wo);
+        k(0) * b[0] + k(1) * b[1] + k(2 + back) * b[2] + k(3 + back) * b[3] + k(4 + back) * b[4]
+    };
+    let woven = value(&m.shape) * scale;
+    if m.flags & MULTIPLIES == 0 {
+        return woven;
+    }
+    woven + value(&closed(m.shape)) * (s.tint * (1.0 - s.alpha))
+}
+
+/// The same sheet without a gap.
+fn closed(mut shape: [f32; crate::scene::MAX_SHAPE]) -> [f32; crate::scene::MAX_SHAPE] {
+    shape[GAMMA_WARP] = 1.0;
+    shape[INV_MEAN_COVER] = 1.0;
+    shape
 }
 
 /// Density of [`sample`].
 #[inline(always)]
-pub(crate) fn density(m: &MaterialRow, wo: Vec3, wi: Vec3) -> f32 {
+pub(crate) fn density(table: &Table, m: &MaterialRow, wo: Vec3, wi: Vec3) -> f32 {
     if m.flags & MATT != 0 {
         return m.weights[if wi.z * wo.z < 0.0 { 0 } else { 2 }] * wi.z.abs() * FRAC_1_PI;
+    }
+    if m.flags & MEASURED != 0 {
+        return measured::density(table, m.measured, wo, wi);
     }
     optics::sheet_pdf(&m.shape, &m.weights, wo, wi)
 }
 
 /// A direction to go on in, in the sheet's frame.
 #[inline(always)]
-pub(crate) fn sample(m: &MaterialRow, wo: Vec3, u: Vec3) -> Vec3 {
+pub(crate) fn sample(table: &Table, m: &MaterialRow, wo: Vec3, u: Vec3) -> Vec3 {
     if m.flags & MATT != 0 {
         let r = u.x.sqrt();
         let (sin, cos) = sincos_turn(u.y);
@@ -307,6 +357,9 @@ pub(crate) fn sample(m: &MaterialRow, wo: Vec3, u: Vec3) -> Vec3 {
             r * sin,
             if (wo.z > 0.0) == through { -z } else { z },
         );
+    }
+    if m.flags & MEASURED != 0 {
+        return measured::sample(table, m.measured, wo, u);
     }
     optics::sheet_sample(&m.shape, &m.weights, wo, u)
 }

@@ -10,7 +10,7 @@ use crate::accumulate::PixelSum;
 use crate::bvh::{EMPTY, Node, Packet};
 use crate::cpu::path::View;
 use crate::cpu::share::{BLOCK, shift};
-use crate::table::{Globals, LightRow, MaterialRow, Shade, Table};
+use crate::table::{Globals, LightRow, MaterialRow, NONE, Shade, Table};
 
 /// What one submit is told.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -165,11 +165,23 @@ fn rows(table: &Table) -> Vec<(&'static str, Vec<u8>)> {
         texels.extend(bytemuck::cast::<_, [u32; 12]>(moved));
     }
     texels.extend(&table.texels);
+    let materials: Vec<MaterialRow> = table
+        .materials
+        .iter()
+        .map(|m| MaterialRow {
+            measured: if m.measured == NONE {
+                NONE
+            } else {
+                m.measured + head
+            },
+            ..*m
+        })
+        .collect();
     vec![
         ("nodes", bytes(&table.bvh.nodes, nowhere)),
         ("triangles", bytes(&table.bvh.packets, Packet::default())),
         ("normals", bytes(&table.shade, Shade::default())),
-        ("materials", bytes(&table.materials, MaterialRow::zeroed())),
+        ("materials", bytes(&materials, MaterialRow::zeroed())),
         ("textures", bytes(&texels, 0)),
         ("lights", bytes(&table.lights, LightRow::default())),
         ("environment", bytes(&table.sky, [0.0_f32; 4])),

@@ -18,6 +18,7 @@ pub fn source() -> String {
         &sobol,
         include_str!("../shader/rng.wgsl"),
         woven_bsdf::shader::OPTICS,
+        include_str!("../shader/measured.wgsl"),
         include_str!("../shader/surface.wgsl"),
         include_str!("../shader/bvh.wgsl"),
         include_str!("../shader/rect.wgsl"),

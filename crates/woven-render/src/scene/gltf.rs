@@ -230,13 +230,13 @@ fn assemble(checked: Checked, base: &Path, options: &Options) -> Result<Loaded> 
             let Source::File(found) = found else {
                 bail!("the fabric of material '{}' must be a file", material.name)
             };
-            material::dress(material, &found)?;
+            material::dress(material, &found, &mut pictures.textures)?;
         }
     }
     for (name, file) in &options.fabrics {
         let mut hit = false;
         for material in materials.iter_mut().filter(|m| m.name == *name) {
-            material::dress(material, file)?;
+            material::dress(material, file, &mut pictures.textures)?;
             hit = true;
         }
         let names = || {

@@ -107,12 +107,12 @@ fn camera_ray(x: u32, y: u32, u: vec4<f32>) -> Ray {
     return ray_new(frame.eye + lens, unit(d * frame.focus - lens));
 }
 
-fn reflectance(m: u32, s: Surface) -> vec3<f32> {
-    var sum = vec3<f32>(0.0);
-    for (var j = 0u; j < 8u; j++) {
-        sum += materials[m].linear[j].xyz;
-    }
-    return sum * s.tint;
+// Sum of the factors on the side of wo.
+fn reflectance(m: u32, s: Surface, wo: vec3<f32>) -> vec3<f32> {
+    let back = select(0u, 3u, wo.z < 0.0);
+    let k = materials[m].linear[0].xyz + materials[m].linear[1].xyz + materials[m].linear[2u + back].xyz
+        + materials[m].linear[3u + back].xyz + materials[m].linear[4u + back].xyz;
+    return k * s.tint;
 }
 
 // A sample of pixel (x, y); `paths` are the random numbers of its path. One loop for camera and path: each heavy
@@ -204,7 +204,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
             let weight = carry.x * (1.0 - gap) * albedo;
             var lit_here = bounce < frame.depth && materials[s.material].emission.w > 0.0;
             if (camera) {
-                out.albedo += reflectance(s.material, s) * (carry.x * (1.0 - gap));
+                out.albedo += reflectance(s.material, s, local(s, -ray.d)) * (carry.x * (1.0 - gap));
                 lit_here = weight > 0.0 && frame.depth > 0u;
             }
             if (lit_here) {

@@ -103,16 +103,23 @@ fn surface(hit: Hit) -> Surface {
 }
 
 fn open_along(m: u32, w: vec3<f32>) -> f32 {
+    if ((materials[m].flags & MEASURED) != 0u) {
+        return measured_gap(materials[m].measured, w);
+    }
     let shape = materials[m].shape[0];
     return openness(shape.x, shape.y, shape.z, w);
+}
+
+fn covered(m: u32, alpha: f32, open: f32) -> f32 {
+    let gap = select(1.0 - alpha * (1.0 - open), alpha * open, (materials[m].flags & MULTIPLIES) != 0u);
+    return clamp(gap, 0.0, 1.0);
 }
 
 fn gap_of(m: u32, s: Surface, d: vec3<f32>) -> f32 {
     if (materials[m].gap >= 0.0) {
         return materials[m].gap;
     }
-    let open = open_along(m, local(s, d));
-    return clamp(1.0 - s.alpha * (1.0 - open), 0.0, 1.0);
+    return covered(m, s.alpha, open_along(m, local(s, d)));
 }
 
 fn gap_at(place: u32, u: f32, v: f32, d: vec3<f32>) -> f32 {
@@ -121,7 +128,7 @@ fn gap_at(place: u32, u: f32, v: f32, d: vec3<f32>) -> f32 {
     if (materials[m].coverage_texture != NONE) {
         alpha = coverage(m, uv_at(place, u, v));
         if (alpha <= 0.0) {
-            return 1.0;
+            return covered(m, 0.0, 1.0);
         }
     }
     var w = vec3<f32>(0.0, 0.0, 1.0);
@@ -130,8 +137,7 @@ fn gap_at(place: u32, u: f32, v: f32, d: vec3<f32>) -> f32 {
         let f = shading_frame(place, u, v, ng);
         w = vec3<f32>(dot(d, f[0]), dot(d, f[1]), dot(d, f[2]));
     }
-    let open = open_along(m, w);
-    return clamp(1.0 - alpha * (1.0 - open), 0.0, 1.0);
+    return covered(m, alpha, open_along(m, w));
 }
 
 fn coverage(m: u32, uv: vec2<f32>) -> f32 {
@@ -227,6 +233,8 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
     let flags = materials[m].flags;
     let w0 = materials[m].weights[0];
     let scale = s.tint * s.alpha;
+    // Reflection has factors of its own for a viewer behind.
+    let back = select(0u, 3u, wo.z < 0.0);
     var wi = known;
     if ((flags & MATT) != 0u && draw) {
         let r = sqrt(u.x);
@@ -237,15 +245,23 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
     }
     var pdf = select(w0.z, w0.x, wi.z * wo.z < 0.0) * abs(wi.z) * FRAC_1_PI;
     if ((flags & (MATT | EVEN)) == (MATT | EVEN)) {
-        let k = materials[m].linear[select(2u, 0u, wi.z * wo.z < 0.0)].xyz;
+        let k = materials[m].linear[select(2u + back, 0u, wi.z * wo.z < 0.0)].xyz;
         return Scattered(wi, k * scale * (materials[m].cover * FRAC_1_PI), pdf);
+    }
+    if ((flags & MEASURED) != 0u) {
+        let first = materials[m].measured;
+        if (draw) {
+            wi = measured_sample(first, wo, u);
+        }
+        let value = measured_value(first, wi, wo);
+        return Scattered(wi, scale * value, value * abs(wi.z) / max(measured_albedo(first, wo), 1e-20));
     }
     let a = materials[m].shape[0];
     let b = materials[m].shape[1];
     let c = materials[m].shape[2];
     let d = materials[m].shape[3];
     let w1 = materials[m].weights[1];
-    let shape = array<f32, 16>(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w);
+    var shape = array<f32, 16>(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w);
     let weights = array<f32, 8>(w0.x, w0.y, w0.z, w0.w, w1.x, w1.y, w1.z, w1.w);
     if ((flags & MATT) == 0u) {
         if (draw) {
@@ -253,8 +269,18 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
         }
         pdf = sheet_pdf(shape, weights, wo, wi);
     }
-    let basis = sheet_basis(shape, wi, wo);
-    let f = materials[m].linear[0].xyz * basis[0] + materials[m].linear[1].xyz * basis[1]
-        + materials[m].linear[2].xyz * basis[2] + materials[m].linear[3].xyz * basis[3];
-    return Scattered(wi, f * scale, pdf);
+    var f = vec3<f32>(0.0);
+    var part = scale;
+    // The woven share, then the closed one where a map tells them apart: one copy of the code.
+    let parts = select(1u, 2u, (flags & MULTIPLIES) != 0u);
+    for (var k = 0u; k < parts; k++) {
+        let basis = sheet_basis(shape, wi, wo);
+        f += (materials[m].linear[0].xyz * basis[0] + materials[m].linear[1].xyz * basis[1]
+            + materials[m].linear[2u + back].xyz * basis[2] + materials[m].linear[3u + back].xyz * basis[3]
+            + materials[m].linear[4u + back].xyz * basis[4]) * part;
+        shape[0] = 1.0;
+        shape[8] = 1.0;
+        part = s.tint * (1.0 - s.alpha);
+    }
+    return Scattered(wi, f, pdf);
 }

@@ -18,6 +18,8 @@ const DOUBLE_SIDED: u32 = 2u;
 const TRANSMITS: u32 = 4u;
 const EMITS: u32 = 8u;
 const EVEN: u32 = 16u;
+const MEASURED: u32 = 32u;
+const MULTIPLIES: u32 = 64u;
 
 // LightRow.kind
 const RECT: u32 = 0u;
@@ -66,6 +68,8 @@ struct MaterialRow {
     alpha_cutoff: f32,
     gap: f32,
     cover: f32,
+    measured: u32,
+    unused: array<u32, 3>,
 }
 
 struct LightRow {
@@ -129,7 +133,7 @@ struct PixelSum {
 @group(0) @binding(2) var<storage, read> packets: array<Packet>;
 @group(0) @binding(3) var<storage, read> shades: array<Shade>;
 @group(0) @binding(4) var<storage, read> materials: array<MaterialRow>;
-// sRGB decoded, SRGB words; rows of textures, TEXTURE_ROW words each; the texels.
+// sRGB decoded, SRGB words; rows of textures, TEXTURE_ROW words each; the texels and measured tables.
 @group(0) @binding(5) var<storage, read> texels: array<u32>;
 @group(0) @binding(6) var<storage, read> lights: array<LightRow>;
 @group(0) @binding(7) var<storage, read> skies: array<vec4<f32>>;

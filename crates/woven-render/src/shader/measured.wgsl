@@ -22,7 +22,7 @@ fn patch_of(first: u32, x: f32, y: f32) -> u32 {
     return texels[ring + 1u] + u32(place) % count;
 }
 
-fn behind(w: vec3<f32>) -> u32 {
+fn other_side(w: vec3<f32>) -> u32 {
     return select(0u, 1u, w.z < 0.0);
 }
 
@@ -35,12 +35,12 @@ fn measured_parts(first: u32) -> vec3<u32> {
 }
 
 fn measured_gap(first: u32, w: vec3<f32>) -> f32 {
-    return number(measured_parts(first).y + behind(w) * texels[first] + patch_of(first, -w.x, -w.y));
+    return number(measured_parts(first).y + other_side(w) * texels[first] + patch_of(first, -w.x, -w.y));
 }
 
 fn measured_value(first: u32, wi: vec3<f32>, wo: vec3<f32>) -> f32 {
     let n = texels[first];
-    let kind = behind(wi) * 2u + select(0u, 1u, behind(wi) == behind(wo));
+    let kind = other_side(wi) * 2u + select(0u, 1u, other_side(wi) == other_side(wo));
     let row = kind * n + patch_of(first, wo.x, wo.y);
     return number(measured_parts(first).x + row * n + patch_of(first, -wi.x, -wi.y));
 }
@@ -48,7 +48,7 @@ fn measured_value(first: u32, wi: vec3<f32>, wo: vec3<f32>) -> f32 {
 // First word of the running sums for a viewer.
 fn measured_row(first: u32, wo: vec3<f32>) -> u32 {
     let n = texels[first];
-    return measured_parts(first).z + (behind(wo) * n + patch_of(first, wo.x, wo.y)) * 2u * n;
+    return measured_parts(first).z + (other_side(wo) * n + patch_of(first, wo.x, wo.y)) * 2u * n;
 }
 
 fn measured_albedo(first: u32, wo: vec3<f32>) -> f32 {

@@ -45,6 +45,9 @@ pub struct Scene {
     pub portals: Vec<Portal>,
     /// The eye.
     pub camera: Camera,
+    /// Colours of vertices: the number of the mesh, and for each of its vertices a linear colour in 0..=1 that
+    /// multiplies the factors as a texture does.
+    pub colors: Vec<(usize, Vec<[f32; 3]>)>,
 }
 
 /// A triangle mesh in world space.
@@ -90,6 +93,10 @@ pub struct Material {
     pub alpha_cutoff: Option<f32>,
     /// Multiplies `emission`.
     pub emission_texture: Option<TextureUse>,
+    /// Bends the shading normal: its colours are 2 c - 1 in the frame of u, minus v and the normal (glTF's convention).
+    pub normal_texture: Option<TextureUse>,
+    /// Multiplies the bending's first two numbers.
+    pub normal_scale: f32,
     /// Emits on both sides.
     pub double_sided: bool,
     /// Light layer of its emission, see [`LAYER_NAMES`].
@@ -299,6 +306,8 @@ impl Material {
             coverage_texture: None,
             alpha_cutoff: None,
             emission_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
             double_sided: false,
             layer: LAYER_LAMPS,
         }

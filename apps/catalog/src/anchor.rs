@@ -4,15 +4,23 @@
 //! frame shows the same surface as the still, frame + b (still of many paths - still of few) has the frame's mean, since the bracket
 //! has mean zero, and less noise, as far as the frame's noise is that of the still of few paths (control variates: Owen, Monte Carlo
 //! theory, 8.9). The best b is the regression of one noise on the other; it is taken from the pixels around, whose noise is told
-//! from their light as the difference to their local mean. On the cloth, which moves, nothing is added.
+//! from their light as the difference to their local mean, for direct and indirect light apart. On the cloth, which moves,
+//! nothing is added.
 
 use anyhow::{Result, ensure};
 use woven_render::film::{BEAUTY, Film};
 
-/// Numbers a pixel: the bracket, the still of few paths, then albedo, normal and depth.
-const WIDTH: usize = 13;
-/// Half the window in which the noises are compared.
-const REACH: usize = 5;
+/// Numbers a pixel: of direct light the bracket and the still of few paths, the same of indirect light, then albedo, normal
+/// and depth.
+const WIDTH: usize = 19;
+/// Where the numbers of direct and of indirect light begin, half the window in which their noises are compared, and the
+/// layers of their variance. Pixels of a block share the noise of indirect light, so that more of them must be looked at.
+const PARTS: [(usize, usize, [&str; 2]); 2] = [
+    (0, 5, ["variance", "direct.variance"]),
+    (6, 16, ["indirect.variance"; 2]),
+];
+/// Where the numbers of the surface begin.
+const GUIDE: usize = 12;
 /// The least share of the variance that the denoiser is told is left: what a few samples say of their own noise is not believed further.
 const LEAST: f32 = 0.6;
 /// Differences of albedo, normal and (relative) depth above which a pixel shows something else.
@@ -29,85 +37,105 @@ impl Anchor {
     /// From the still with few and with many paths a pixel, both with the layers "albedo", "normal" and "depth"; `rest` is few over many.
     #[must_use]
     pub fn new(few: &Film, many: &Film, rest: f32) -> Self {
-        let (Some(a), Some(b), Some(guide)) = (few.beauty(), many.beauty(), guide(few)) else {
+        let (Some(a), Some(b), Some(guide)) = (parts(few), parts(many), guide(few)) else {
             return Self::default();
         };
-        let pixels = a.iter().zip(b).zip(guide).map(|((a, b), g)| {
+        let pixel = |(i, g): (usize, [f32; 7])| {
             let mut all = [0.0; WIDTH];
-            for c in 0..3 {
-                let bracket = b[c] - a[c];
-                all[c] = if bracket.is_finite() { bracket } else { 0.0 };
-                all[3 + c] = if a[c].is_finite() { a[c] } else { 0.0 };
+            for ((at, ..), (a, b)) in PARTS.iter().zip(a.iter().zip(&b)) {
+                for c in 0..3 {
+                    let bracket = b[i][c] - a[i][c];
+                    all[at + c] = if bracket.is_finite() { bracket } else { 0.0 };
+                    all[at + 3 + c] = if a[i][c].is_finite() { a[i][c] } else { 0.0 };
+                }
             }
-            all[6..].copy_from_slice(&g);
+            all[GUIDE..].copy_from_slice(&g);
             all
-        });
+        };
         Self {
-            pixels: pixels.collect(),
+            pixels: guide.into_iter().enumerate().map(pixel).collect(),
             rest,
         }
     }
 
     /// Steadies a frame that was begun with the same random numbers as the still.
     pub fn steady(&self, film: &mut Film) {
-        let (width, height) = (film.width, film.height);
         let Some(guide) = guide(film).filter(|g| g.len() == self.pixels.len()) else {
             return;
         };
-        let Some(light) = film.beauty() else { return };
+        let Some(mut parts) = parts(film) else { return };
         let same: Vec<f32> = self
             .pixels
             .iter()
             .zip(&guide)
-            .map(|(a, g)| if same(&a[6..], g) { 1.0 } else { 0.0 })
+            .map(|(a, g)| if same(&a[GUIDE..], g) { 1.0 } else { 0.0 })
             .collect();
-        let frame: Vec<f32> = light
+        for (part, (at, reach, variances)) in parts.iter_mut().zip(PARTS) {
+            let size = [film.width, film.height];
+            let weights = self.weights(part, at, &same, size, reach);
+            for ((pixel, anchor), (b, _)) in part.iter_mut().zip(&self.pixels).zip(&weights) {
+                *pixel = [0, 1, 2].map(|c| (pixel[c] + b * anchor[at + c]).max(0.0));
+            }
+            for layer in &mut film.layers {
+                if variances.contains(&layer.name.as_str()) {
+                    for (pixel, (_, left)) in layer.pixels.iter_mut().zip(&weights) {
+                        *pixel = pixel.map(|v| v * left);
+                    }
+                }
+            }
+        }
+        let [direct, indirect] = &parts;
+        for layer in &mut film.layers {
+            for ((pixel, d), i) in layer.pixels.iter_mut().zip(direct).zip(indirect) {
+                match layer.name.as_str() {
+                    BEAUTY => *pixel = [0, 1, 2].map(|c| d[c] + i[c]),
+                    "indirect" => *pixel = *i,
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    /// What share of the bracket is to be added to each pixel of a part of the light, and what share of its variance is left.
+    fn weights(
+        &self,
+        part: &[[f32; 3]],
+        at: usize,
+        same: &[f32],
+        [width, height]: [usize; 2],
+        reach: usize,
+    ) -> Vec<(f32, f32)> {
+        let frame: Vec<f32> = part
             .iter()
-            .zip(&same)
+            .zip(same)
             .map(|(p, s)| s * luminance(p))
             .collect();
         let still: Vec<f32> = self
             .pixels
             .iter()
-            .zip(&same)
-            .map(|(a, s)| s * luminance(&a[3..6]))
+            .zip(same)
+            .map(|(a, s)| s * luminance(&a[at + 3..at + 6]))
             .collect();
-        let count = window(&same, width, height);
+        let window = |values: &[f32]| window(values, width, height, reach);
+        let count = window(same);
         let noise = |values: &[f32]| -> Vec<f32> {
-            let sums = window(values, width, height);
+            let sums = window(values);
             (0..values.len())
                 .map(|i| same[i] * (values[i] - sums[i] / count[i].max(1.0)))
                 .collect()
         };
         let (f, r) = (noise(&frame), noise(&still));
-        let sum = |a: &[f32], b: &[f32]| {
-            window(
-                &a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<_>>(),
-                width,
-                height,
-            )
-        };
+        let sum =
+            |a: &[f32], b: &[f32]| window(&a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<_>>());
         let (fr, rr, ff) = (sum(&f, &r), sum(&r, &r), sum(&f, &f));
-        // (b, share of the variance that is left) of each pixel.
-        let weights: Vec<(f32, f32)> = (0..same.len())
+        (0..same.len())
             .map(|i| {
                 let b = same[i] * (fr[i] / rr[i].max(1e-20)).clamp(0.0, 1.0);
                 let explained = (fr[i] * fr[i] / (rr[i] * ff[i]).max(1e-30)).clamp(0.0, 1.0);
                 let left = (1.0 - same[i] * explained + b * b * self.rest).clamp(LEAST, 1.0);
                 (b, left)
             })
-            .collect();
-        for layer in &mut film.layers {
-            for ((pixel, anchor), (b, left)) in
-                layer.pixels.iter_mut().zip(&self.pixels).zip(&weights)
-            {
-                match layer.name.as_str() {
-                    BEAUTY => *pixel = [0, 1, 2].map(|c| (pixel[c] + b * anchor[c]).max(0.0)),
-                    "variance" => *pixel = pixel.map(|v| v * left),
-                    _ => {}
-                }
-            }
-        }
+            .collect()
     }
 
     /// For a file; read back by [`Self::from_bytes`].
@@ -143,11 +171,11 @@ fn luminance(c: &[f32]) -> f32 {
     0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
 }
 
-/// Sums over the window around each pixel, cut at the border.
-fn window(values: &[f32], width: usize, height: usize) -> Vec<f32> {
+/// Sums over the window of `reach` pixels around each pixel, cut at the border.
+fn window(values: &[f32], width: usize, height: usize, reach: usize) -> Vec<f32> {
     let line = |from: &[f32], n: usize, at: &dyn Fn(usize) -> usize, to: &mut [f32]| {
         for i in 0..n {
-            to[at(i)] = (i.saturating_sub(REACH)..(i + REACH + 1).min(n))
+            to[at(i)] = (i.saturating_sub(reach)..(i + reach + 1).min(n))
                 .map(|k| from[at(k)])
                 .sum();
         }
@@ -160,6 +188,18 @@ fn window(values: &[f32], width: usize, height: usize) -> Vec<f32> {
         line(&rows, height, &|y| y * width + x, &mut out);
     }
     out
+}
+
+/// Direct and indirect light of each pixel; a film that does not tell them apart has direct light only.
+fn parts(film: &Film) -> Option<[Vec<[f32; 3]>; 2]> {
+    let mut direct = film.beauty()?.to_vec();
+    let indirect = film
+        .layer("indirect")
+        .map_or_else(|| vec![[0.0; 3]; direct.len()], <[_]>::to_vec);
+    for (d, i) in direct.iter_mut().zip(&indirect) {
+        *d = [0, 1, 2].map(|c| d[c] - i[c]);
+    }
+    Some([direct, indirect])
 }
 
 /// Albedo, normal and depth of each pixel, if the film knows them.
@@ -219,6 +259,14 @@ mod tests {
         film
     }
 
+    /// The same film with half of its light indirect.
+    fn halved(film: &Film) -> Film {
+        let mut halved = film.clone();
+        let half = film.beauty().unwrap().iter().map(|p| p.map(|c| 0.5 * c));
+        halved.push("indirect", half.collect());
+        halved
+    }
+
     fn error(film: &Film, half: usize) -> f32 {
         let pixels = film.beauty().unwrap();
         let of = (0..pixels.len())
@@ -250,6 +298,19 @@ mod tests {
             "the cloth came nearer: nothing is added"
         );
         assert!(frame.layer("variance").unwrap()[0][0] < 0.0065);
+    }
+
+    #[test]
+    fn indirect_light_is_steadied_by_its_own_noise() {
+        let (few, many) = (film(|i| 1.0 + 0.3 * noise(i, 1), 2.0), film(|_| 1.0, 2.0));
+        let anchor = Anchor::new(&halved(&few), &halved(&many), 0.1);
+        let mut frame = halved(&film(|i| 1.0 + 0.3 * noise(i, 1) + 0.03 * noise(i, 2), 2.0));
+        let before = frame.clone();
+        anchor.steady(&mut frame);
+        assert!(error(&frame, 0) < 0.2 * error(&before, 0));
+        let indirect = frame.layer("indirect").unwrap();
+        let worst = indirect.iter().map(|p| (p[0] - 0.5).abs());
+        assert!(worst.fold(0.0, f32::max) < 0.05, "{indirect:?}");
     }
 
     #[test]

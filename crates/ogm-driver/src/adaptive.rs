@@ -152,8 +152,7 @@ pub fn refine(plan: &Plan, rig: &Rig, readings: &[Reading], poses: &[Pose]) -> R
             .collect();
         line.sort_by(|p, q| p.0.total_cmp(&q.0));
         line.dedup_by(|p, q| (p.0 - q.0).abs() < 1e-3);
-        let d = &rig.detector;
-        let blind = d.aperture_deg / 2.0 + d.beam_half_deg + 4.3 * d.angle_deg;
+        let blind = rig.detector.blind_deg();
         for (t, need) in halve(&line, a, straight_at(theta_l, phi_l, plane), blind) {
             let pose = Adaptive::pose(theta_l, phi_l, plane, t);
             let mut known = poses.iter().chain(out.iter().map(|(_, p)| p));

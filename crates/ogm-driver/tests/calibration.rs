@@ -5,6 +5,7 @@ mod common;
 
 use std::sync::{Arc, Mutex};
 
+use common::measure;
 use ogm_driver::merge::{Measurement, merge_log};
 use ogm_driver::plan::Plan;
 use ogm_driver::rig::Rig;
@@ -13,25 +14,6 @@ use ogm_driver::sim::noise::Noise;
 use ogm_driver::sim::optics::{FnSample, PlainCloth, Sample};
 use ogm_driver::sim::{Bench, Device, FaultPlan, Imperfections, MemoryTransport};
 use ogm_driver::transport::StopToken;
-
-fn measure(rig: &Rig, sample: Arc<dyn Sample>, wrong: Imperfections, plan: &Plan) -> Measurement {
-    let device = Arc::new(Mutex::new(Device::new(
-        Bench::new(rig.clone(), sample, wrong),
-        FaultPlan::none(),
-    )));
-    let folder = common::quick_folder();
-    let log = folder.path().join("x.ogm");
-    scan::run(
-        Box::new(MemoryTransport::new(device)),
-        rig,
-        plan,
-        &log,
-        &StopToken::new(),
-        &mut Quiet,
-    )
-    .unwrap();
-    merge_log(&log).unwrap()
-}
 
 fn paper(calibration: &str) -> Plan {
     Plan::from_toml(&format!("name = 'c'\n[grid]\nkind = 'paper'\nlight_elevations = [180, 150]\n[calibration]\n{calibration}")).unwrap()

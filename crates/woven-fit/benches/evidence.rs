@@ -134,7 +134,10 @@ fn global(first: u64, sets: u64) {
             let least = starts.iter().map(|x| cost(x)).fold(f64::INFINITY, f64::min);
             reached <= least * 1.001
         };
-        let found = (first..first + sets).into_par_iter().filter(reaches).count();
+        let found = (first..first + sets)
+            .into_par_iter()
+            .filter(reaches)
+            .count();
         println!(
             "{}: global minimum of {found} of {sets} random truths ({} starts, against 64)",
             spec.label, options.starts

@@ -4,14 +4,15 @@
 //! progress each second on a terminal. Input n depends on n alone: `-- 1 csv 12345` runs one again.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use woven_bsdf::measured::csv::Scan;
+use std::path::Path;
+use woven_bsdf::measured::tensor_tree::TensorTree;
 use woven_fit::directions::Directions;
-use woven_fit::measurement::{Detail, Measurement};
+use woven_fit::measurement::{Detail, Measurement, Source};
 use woven_fit::photos::{Photo, Setup};
 use woven_fit::starts::hash;
 
 /// Pieces that readers trip over.
-const PIECES: [&str; 22] = [
+const PIECES: [&str; 25] = [
     "nan",
     "inf",
     "-inf",
@@ -31,6 +32,9 @@ const PIECES: [&str; 22] = [
     "#",
     "# direct,0,0,0.5,\n",
     "# aperture_deg,44\n",
+    "# shared,light_theta_deg,40\n",
+    "# shared,scale,0.1\n",
+    "<nPhis>9</nPhis>",
     "\u{fe0f}",
     "lx",
     "99999999999999999999999999999999",
@@ -66,9 +70,25 @@ fn mutate(seed: &[u8], n: u64) -> Vec<u8> {
     out
 }
 
-const CSV: &str = "# a cloth\n# aperture_deg,1.5\n# direct,0,0,0.3,0.01\ntheta_l_deg,phi_l_deg,theta_v_deg,phi_v_deg,f,sigma\n0,0,170,0,0.31,0.01\n0,0,150,90,0.12,\n30,180,120,45,0.05,\n30,180,40,0,0.01,\n";
+const CSV: &str = "# a cloth\n# aperture_deg,1.5\n# shared,scale,4e-4\n# shared,view_phi_deg,0.06\n# direct,0,0,0.3,0.01\ntheta_l_deg,phi_l_deg,theta_v_deg,phi_v_deg,f,sigma\n0,0,170,0,0.31,0.01\n0,0,150,90,0.12,\n30,180,120,45,0.05,\n30,180,40,0,0.01,\n";
 
 const DIRECTIONS: &str = "lx,ly,lz,vx,vy,vz,note\n0,0,1,0,0,-1,on\n0,0,2,0.6,0,-0.8,\"a, b\"\n";
+
+const PAB: &str = "#sample_name \"lace 3\"\n#intheta 30\n#inphi 0\n#format: theta phi BTDF\n150 180 0.52\n 150  90.5 1e-3 \n";
+
+/// A matrix over three patches.
+const KLEMS: &str = "<WindowElement><Optical><Layer><Material><Name>x</Name><Manufacturer>y</Manufacturer></Material><DataDefinition>\
+    <IncidentDataStructure>Columns</IncidentDataStructure><AngleBasis><AngleBasisBlock><ThetaBounds><LowerTheta>0</LowerTheta>\
+    <UpperTheta>40</UpperTheta></ThetaBounds><nPhis>1</nPhis></AngleBasisBlock><AngleBasisBlock><ThetaBounds><LowerTheta>40</LowerTheta>\
+    <UpperTheta>90</UpperTheta></ThetaBounds><nPhis>2</nPhis></AngleBasisBlock></AngleBasis></DataDefinition><WavelengthData>\
+    <Wavelength>Visible</Wavelength><WavelengthDataBlock><WavelengthDataDirection>Transmission Front</WavelengthDataDirection>\
+    <ScatteringData>0.5, 0.1 0.1\n0.1 0.5 0.1\n0.1 0.1 0.5</ScatteringData></WavelengthDataBlock></WavelengthData></Layer></Optical></WindowElement>";
+
+const TREE: &str = "<WindowElement><Optical><Layer><Material><Name>x</Name><Manufacturer>y</Manufacturer></Material><DataDefinition>\
+    <IncidentDataStructure>TensorTree3</IncidentDataStructure></DataDefinition><WavelengthData><Wavelength>Visible</Wavelength>\
+    <WavelengthDataBlock><WavelengthDataDirection>Transmission Front</WavelengthDataDirection><AngleBasis>LBNL/Shirley-Chiu</AngleBasis>\
+    <ScatteringDataType>BTDF</ScatteringDataType><ScatteringData>{{1}{1}{1}{1}{1}{1}{1}{1 2 3 4 5 6 7 8}}</ScatteringData>\
+    </WavelengthDataBlock></WavelengthData></Layer></Optical></WindowElement>";
 
 /// A picture of 6 × 6 pixels as PNG.
 fn picture() -> Vec<u8> {
@@ -81,31 +101,52 @@ fn picture() -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// Whether the input was read; panics on numbers that a fit must not see.
-fn read(reader: &str, input: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(input);
+/// Panics on numbers that a fit must not see.
+fn sound(data: &Measurement, detail: Detail) {
+    data.remarks();
+    for transmission in [true, false] {
+        let points = data.points(transmission, detail, false);
+        for p in &points.points {
+            assert!(p.f.is_finite() && p.area.is_finite() && p.gap_density.is_finite());
+            assert!(p.incidence < points.incidences.len() && p.nodes.1 <= points.nodes.len());
+        }
+        let finite = |w: woven_bsdf::vec3::Vec3<f64>| w.length_sqr().is_finite();
+        assert!(points.nodes.iter().all(|n| finite(n.l) && finite(n.v)));
+        assert!(
+            points
+                .shared
+                .iter()
+                .all(|s| s.sigma > 0.0 && s.sigma.is_finite())
+        );
+    }
+}
+
+/// Whether input `n` was read; panics on what a fit must not see.
+fn read(reader: &str, n: u64, input: &[u8]) -> bool {
     match reader {
-        "csv" => {
-            let Ok(scan) = Scan::parse(&text) else {
+        "csv" | "pab" | "klems" => {
+            let end = if reader == "klems" { "xml" } else { reader };
+            let Ok(data) = Measurement::parse(Path::new(&format!("made.{end}")), input) else {
                 return false;
             };
-            let data = Measurement::from_scan("made", scan);
-            data.remarks();
-            for transmission in [true, false] {
-                let points = data.points(transmission, Detail::Full, false);
-                for p in &points.points {
-                    assert!(p.f.is_finite() && p.area.is_finite() && p.gap_density.is_finite());
-                    assert!(
-                        p.incidence < points.incidences.len() && p.nodes.1 <= points.nodes.len()
-                    );
-                }
-                let finite = |w: woven_bsdf::vec3::Vec3<f64>| w.length_sqr().is_finite();
-                assert!(points.nodes.iter().all(|n| finite(n.l) && finite(n.v)));
+            sound(&data, Detail::Full);
+            true
+        }
+        "tensor" => {
+            let Ok(tree) = TensorTree::parse(&String::from_utf8_lossy(input)) else {
+                return false;
+            };
+            // Averaging over the patches of a full basis takes a tenth of a second.
+            if n.is_multiple_of(256) {
+                let scan = woven_bsdf::measured::csv::Scan::default();
+                let mut data = Measurement::from_scan("made", scan);
+                data.source = Source::Klems(tree.to_klems());
+                sound(&data, Detail::Coarse);
             }
             true
         }
         "directions" => {
-            let Ok(list) = Directions::parse(&text) else {
+            let Ok(list) = Directions::parse(&String::from_utf8_lossy(input)) else {
                 return false;
             };
             for (_, l, v) in &list.rows {
@@ -135,6 +176,9 @@ fn main() {
     let first: u64 = args.next().and_then(|a| a.parse().ok()).unwrap_or(0);
     let seeds = [
         ("csv", CSV.as_bytes().to_vec()),
+        ("pab", PAB.as_bytes().to_vec()),
+        ("klems", KLEMS.as_bytes().to_vec()),
+        ("tensor", TREE.as_bytes().to_vec()),
         ("directions", DIRECTIONS.as_bytes().to_vec()),
         ("photo", picture()),
     ];
@@ -142,7 +186,10 @@ fn main() {
         if only.as_ref().is_some_and(|o| o != reader) {
             continue;
         }
-        assert!(read(reader, seed), "{reader}: the seed itself must be read");
+        assert!(
+            read(reader, 0, seed),
+            "{reader}: the seed itself must be read"
+        );
         let bar = ProgressBar::new(count);
         bar.set_style(
             ProgressStyle::with_template("{msg:12} {bar:24} {pos}/{len}, {per_sec}, {eta} left")
@@ -151,7 +198,7 @@ fn main() {
         bar.set_message(*reader);
         let mut good = 0u64;
         for n in first..first + count {
-            good += u64::from(read(reader, &mutate(seed, n)));
+            good += u64::from(read(reader, n, &mutate(seed, n)));
             if n % 4096 == 0 {
                 bar.set_position(n - first);
             }

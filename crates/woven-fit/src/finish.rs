@@ -9,6 +9,7 @@ use crate::profile::{self, Range};
 use crate::robust::Loss;
 use crate::solve::{Outcome, Residuals, Settings, solve};
 use crate::uncertainty::uncertainty;
+use crate::whiten::{Whitened, Whitening, settle};
 
 /// Beyond this many kernel nodes a fit stops at fewer digits, and cross-validates and profiles only on demand.
 pub(crate) const LARGE: usize = 20_000;
@@ -35,6 +36,12 @@ pub(crate) struct Finished {
     pub(crate) agreeing: usize,
     /// Root mean square × 10⁴ over incidences left out.
     pub(crate) cross_validation_e4: Option<f64>,
+    /// The points as the fit takes them, where errors that they share change that.
+    pub(crate) points: Option<Points>,
+    /// How the rows were made independent of errors that they share.
+    pub(crate) whitening: Whitening,
+    /// What the data say of each shared error, in its standard deviations.
+    pub(crate) offsets: Vec<f64>,
     /// Profiles of the parameters for which the covariance misleads, in the order of the spec's names.
     pub(crate) ranges: Vec<Option<Range>>,
 }
@@ -42,15 +49,9 @@ pub(crate) struct Finished {
 /// Square roots of the weights that come with the data: each point's share of the light, 1/σ where all rows have one,
 /// √cosθ if wished.
 pub(crate) fn base_weights(points: &Points, options: &Options) -> Vec<f64> {
-    let known = |s: Option<f64>| s.is_some_and(|s| s > 0.0);
-    let all_sigma =
-        options.metric == Metric::Linear && points.points.iter().all(|p| known(p.sigma));
-    let weight = |p: &Point| {
-        let sigma = if all_sigma {
-            p.sigma.unwrap_or(1.0)
-        } else {
-            1.0
-        };
+    let sigmas = sigmas(points, options.metric);
+    let weight = |(i, p): (usize, &Point)| {
+        let sigma = sigmas.as_ref().map_or(1.0, |s| s[i]);
         let cosine = if options.cosine_weights {
             p.v.z.abs().sqrt()
         } else {
@@ -58,7 +59,13 @@ pub(crate) fn base_weights(points: &Points, options: &Options) -> Vec<f64> {
         };
         cosine * p.share.sqrt() / sigma
     };
-    points.points.iter().map(weight).collect()
+    points.points.iter().enumerate().map(weight).collect()
+}
+
+/// Standard errors by which the rows are weighted: in the linear metric, where all rows have one.
+fn sigmas(points: &Points, metric: Metric) -> Option<Vec<f64>> {
+    let one = |p: &Point| p.sigma.filter(|&s| s > 0.0 && metric == Metric::Linear);
+    points.points.iter().map(one).collect()
 }
 
 /// Misfits in the metric, unweighted.
@@ -160,11 +167,26 @@ pub(crate) fn finish(
             evaluations += s.evaluations;
         }
     }
-    let (mut r, mut jacobian) = (
-        vec![0.0; joint.rows()],
-        vec![0.0; joint.rows() * joint.params()],
-    );
-    joint.evaluate(&both, &mut r, Some(&mut jacobian));
+    // Errors that the rows share change what the minimum is.
+    let known = sigmas(full, options.metric);
+    let settled = settle(&mut joint, known.as_deref(), &both, &settings);
+    let (mut whitening, mut offsets, mut points) = (Whitening::default(), Vec::new(), None);
+    if let Some(s) = settled {
+        (both, outcome) = (s.solution.x, s.solution.outcome);
+        evaluations += s.solution.evaluations;
+        (whitening, offsets) = (s.whitening, s.found);
+        joint.weights = s.weights;
+        points = Some(s.points);
+    }
+    joint.eval.points = points.as_ref().unwrap_or(full);
+    let (m, columns) = (joint.rows(), joint.params());
+    let (mut r, mut jacobian) = (vec![0.0; m], vec![0.0; m * columns]);
+    let inner = &mut joint;
+    Whitened {
+        inner,
+        whitening: &whitening,
+    }
+    .evaluate(&both, &mut r, Some(&mut jacobian));
     let at_bound = at_bounds(&joint, &both);
     let x = both.split_off(n);
     Some(Finished {
@@ -177,8 +199,11 @@ pub(crate) fn finish(
         evaluations,
         agreeing: 0,
         cross_validation_e4: None,
-        ranges: vec![None; joint.params()],
+        ranges: vec![None; columns],
         weights: joint.weights,
+        whitening,
+        offsets,
+        points,
     })
 }
 
@@ -201,7 +226,8 @@ pub(crate) fn finish_with_profiles(
         return Some(best);
     }
     for _ in 0..3 {
-        let eval = Evaluator { spec, points: full };
+        let points = best.points.as_ref().unwrap_or(full);
+        let eval = Evaluator { spec, points };
         let mut joint = Joint::new(eval, best.weights.clone(), options.metric, floor);
         let both: Vec<f64> = best.k.iter().chain(&best.x).copied().collect();
         let (m, names) = (full.points.len(), spec.names());
@@ -214,7 +240,11 @@ pub(crate) fn finish_with_profiles(
             best.sse,
             true,
         );
-        match profile::ranges(&mut joint, &both, &best.at_bound, &u, best.sse) {
+        let mut problem = Whitened {
+            inner: &mut joint,
+            whitening: &best.whitening,
+        };
+        match profile::ranges(&mut problem, &both, &best.at_bound, &u, best.sse) {
             Ok(ranges) => {
                 best.ranges = ranges;
                 break;

@@ -1,6 +1,7 @@
 //! From a measurement to ranked models: what is asked, what comes back, and the way through all models.
 
-use crate::measurement::{Detail, Measurement, Points};
+use crate::measurement::shared::{Kind, shared};
+use crate::measurement::{Detail, Measurement, Points, Source};
 use crate::problem::{Metric, Spec};
 use crate::rank;
 use crate::reflection::reflected;
@@ -124,6 +125,8 @@ pub struct ModelFit {
     pub bic: f64,
     /// Root mean square × 10⁴ over incidences that the fit had not seen; none without several incidences.
     pub cross_validation_e4: Option<f64>,
+    /// What the data say of errors that all rows share: kind, value, standard deviation before the fit.
+    pub offsets: Vec<(Kind, f64, f64)>,
     /// How the solver ended, in a word.
     pub outcome: String,
     /// Evaluations of the last fit.
@@ -261,13 +264,13 @@ pub fn variants(model: &'static ModelInfo, measured_gap: bool) -> Vec<Spec> {
 /// As [`fit_measurement`].
 pub fn fit(data: &Measurement, options: &Options, progress: Progress<'_>) -> Result<FitResult> {
     let models = models_named(options.models.as_deref())?;
+    if let Source::Scan(scan) = &data.source {
+        shared(scan)?;
+    }
     let coarse = data.points(true, Detail::Coarse, options.normal_only);
     let full = data.points(true, Detail::Full, options.normal_only);
-    let file = data
-        .path
-        .file_name()
-        .map(|f| f.to_string_lossy().into_owned())
-        .unwrap_or_default();
+    let file = data.path.file_name().unwrap_or_default();
+    let file = file.to_string_lossy().into_owned();
     if full.points.len() < 3 {
         bail!(
             "{}: only {} usable transmission values{}; a fit needs more",

@@ -6,10 +6,12 @@
 
 use crate::finish::{Finished, at_bounds, base_weights, finish, finish_with_profiles};
 use crate::fit::Options;
-use crate::measurement::Points;
+use crate::measurement::shared::{Kind, shifted};
+use crate::measurement::{Point, Points};
 use crate::problem::{Evaluator, GAP, Joint, Spec};
 use crate::search::search;
 use crate::solve::{Residuals, Settings, solve};
+use crate::whiten::{Whitened, Whitening, columns};
 use woven_bsdf::dual::Dual;
 use woven_bsdf::vec3::Vec3;
 use woven_bsdf::weave::openness;
@@ -62,12 +64,13 @@ pub(crate) fn with_gap(
         .unzip();
     let ranges = factors.iter().copied().chain(of_shape).collect();
     let (k, m, n) = (part.k.clone(), full.points.len(), part.k.len() + x.len());
-    let mut joint = Joint::new(
-        Evaluator { spec, points: full },
-        base_weights(full, options),
-        options.metric,
-        floor,
-    );
+    let mut weights = base_weights(full, options);
+    let off = (0..m).filter(|&i| !full.points[i].is_peak());
+    for (i, w) in off.zip(&part.weights) {
+        weights[i] = *w;
+    }
+    let eval = Evaluator { spec, points: full };
+    let mut joint = Joint::new(eval, weights, options.metric, floor);
     let start: Vec<f64> = k.iter().chain(&x).copied().collect();
     let (mut r, mut jacobian) = (vec![0.0; m], vec![0.0; m * n]);
     joint.evaluate(&start, &mut r, Some(&mut jacobian));
@@ -77,7 +80,8 @@ pub(crate) fn with_gap(
         rows.fold((0usize, 0.0), |(n, s), i| (n + 1, s + value(i) * value(i)))
     };
     let scatter = |peaks: bool, spent: usize| {
-        let (rows, squares) = sum(peaks, &|i| r[i]);
+        let (rows, own) = sum(peaks, &|i| r[i]);
+        let squares = if peaks { own } else { part.sse };
         let level = sum(peaks, &|i| full.points[i].f).1 / rows.max(1) as f64;
         let variance = if rows > 2 * spent {
             (squares / (rows - spent) as f64).max(1e-24 * level)
@@ -96,6 +100,24 @@ pub(crate) fn with_gap(
                 0.0
             };
         }
+    }
+    // The errors that all rows share, for each group by itself.
+    let shared = columns(&joint, &start).unwrap_or_default();
+    let both: Vec<f64> = [false, true]
+        .into_iter()
+        .flat_map(|peaks| {
+            let points = full.points.iter().cycle();
+            let row = move |(v, p): (&f64, &Point)| match p.is_peak() == peaks {
+                true => v / scales[usize::from(peaks)],
+                false => 0.0,
+            };
+            shared.iter().zip(points).map(row)
+        })
+        .collect();
+    if let Some(whitening) = Whitening::new(&both, m, 1.0) {
+        jacobian
+            .chunks_exact_mut(m)
+            .for_each(|column| whitening.apply(column));
     }
     let dof = m.saturating_sub(n).max(1) as f64;
     let at_bound = at_bounds(&joint, &start);
@@ -163,5 +185,55 @@ fn gap_alone(points: &Points, scattered: Option<&[f64]>) -> [f64; 3] {
     let best = tries
         .map(|x| solve(&mut rows, &x, &settings))
         .min_by(|a, b| a.sse.total_cmp(&b.sse));
-    best.map_or([g, g, 0.5], |s| [s.x[0], s.x[1], s.x[2]])
+    let Some(mut best) = best else {
+        return [g, g, 0.5];
+    };
+    if let Some(whitening) = shared_by_peaks(points, &best.x, best.sse) {
+        let inner = &mut rows;
+        best = solve(
+            &mut Whitened {
+                inner,
+                whitening: &whitening,
+            },
+            &best.x,
+            &settings,
+        );
+    }
+    [best.x[0], best.x[1], best.x[2]]
+}
+
+/// How straight-through rows become independent of the errors that they share; none where there are none.
+fn shared_by_peaks(points: &Points, x: &[f64], sse: f64) -> Option<Whitening> {
+    let peaks = points.filter(Point::is_peak);
+    let m = peaks.points.len();
+    let open = |points: &Points| -> Vec<f64> {
+        let rows = points.points.iter();
+        rows.map(|p| openness(x[0], x[1], x[2], p.l)).collect()
+    };
+    let here = open(&peaks);
+    let mut columns = Vec::new();
+    for s in &points.shared {
+        match s.kind {
+            Kind::Scale => columns.extend(here.iter().map(|t| t * s.sigma)),
+            Kind::Floor => columns.extend(peaks.points.iter().map(|p| match p.direct_only {
+                true => 0.0,
+                false => s.sigma / p.v.z.abs() / p.gap_density,
+            })),
+            Kind::LightTheta | Kind::LightPhi => {
+                let [up, down] = [s.sigma, -s.sigma].map(|d| open(&shifted(&peaks, s.kind, d).0));
+                columns.extend(up.iter().zip(down).map(|(a, b)| 0.5 * (a - b)));
+            }
+            Kind::ViewTheta | Kind::ViewPhi => {}
+        }
+    }
+    if columns.is_empty() {
+        return None;
+    }
+    let level = here.iter().map(|t| t * t).sum::<f64>() / m as f64;
+    let variance = if m > 6 {
+        sse / (m - 3) as f64
+    } else {
+        4e-4 * level
+    };
+    Whitening::new(&columns, m, variance.sqrt())
 }

@@ -56,3 +56,4 @@ mod summary;
 pub mod synth;
 pub mod text;
 pub mod uncertainty;
+mod whiten;

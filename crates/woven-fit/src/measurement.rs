@@ -6,14 +6,15 @@
 
 mod kernel;
 mod remarks;
+pub mod shared;
 
 use anyhow::{Context, Result, bail};
 use sha2::{Digest, Sha256};
+use shared::Shared;
 use std::path::{Path, PathBuf};
 use woven_bsdf::measured::csv::Scan;
 use woven_bsdf::measured::klems::{Block, Kind, Klems};
 use woven_bsdf::measured::pab::Pab;
-use woven_bsdf::measured::tensor_tree::TensorTree;
 use woven_bsdf::vec3::Vec3;
 
 /// One pair of directions inside a kernel, with its share of the average.
@@ -69,6 +70,7 @@ impl Points {
             points: self.points.iter().filter(|p| keep(p)).copied().collect(),
             nodes: self.nodes.clone(),
             incidences: self.incidences.clone(),
+            shared: self.shared.clone(),
         }
     }
 }
@@ -82,6 +84,8 @@ pub struct Points {
     pub nodes: Vec<Node>,
     /// Centre directions to the light.
     pub incidences: Vec<Vec3<f64>>,
+    /// Errors that all values share.
+    pub shared: Vec<Shared>,
 }
 
 /// What the file is.
@@ -114,29 +118,42 @@ impl Measurement {
     /// # Errors
     /// A sentence that names the file and what to do.
     pub fn read(path: &Path) -> Result<Self> {
+        let bytes =
+            std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        Self::parse(path, &bytes)
+    }
+
+    /// Reads the bytes of a file; `path` gives the format by its ending and the name by its stem.
+    ///
+    /// # Errors
+    /// As [`Measurement::read`].
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
         let extension = path
             .extension()
             .map(|e| e.to_string_lossy().to_lowercase())
             .unwrap_or_default();
-        let bytes =
-            std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-        let sha256 = Sha256::digest(&bytes)
-            .iter()
-            .map(|b| format!("{b:02x}"))
-            .collect();
+        if !["xml", "csv", "pab", "txt", "dat"].contains(&extension.as_str()) {
+            bail!(
+                "{}: the ending {extension:?} is unknown; measurements are .xml (Klems or tensor tree), .csv (theta_l_deg,…) or .pab (PAB text)",
+                path.display()
+            );
+        }
+        let text = std::str::from_utf8(bytes).map_err(|e| {
+            anyhow::anyhow!(
+                "{} is not UTF-8 text (byte {})",
+                path.display(),
+                e.valid_up_to()
+            )
+        })?;
+        let place = || path.display().to_string();
         let stem = path
             .file_stem()
             .map(|s| s.to_string_lossy().into_owned())
             .unwrap_or_default();
         let (source, name, maker) = match extension.as_str() {
             "xml" => {
-                let text = String::from_utf8_lossy(&bytes);
-                // Tensor trees share the ending; they are averaged over Klems' patches.
-                let klems = if text.contains("TensorTree") {
-                    TensorTree::read(path)?.to_klems()
-                } else {
-                    Klems::read(path)?
-                };
+                // Tensor trees share the ending; they come averaged over Klems' patches.
+                let klems = Klems::parse(text).with_context(place)?;
                 let name = if klems.name.is_empty() {
                     stem
                 } else {
@@ -145,13 +162,20 @@ impl Measurement {
                 let maker = klems.manufacturer.clone();
                 (Source::Klems(klems), name, maker)
             }
-            "csv" => (Source::Scan(Scan::read(path)?), stem, String::new()),
-            "pab" | "txt" | "dat" => (Source::Scan(Pab::read(path)?.scan()), stem, String::new()),
-            other => bail!(
-                "{}: the ending {other:?} is unknown; measurements are .xml (Klems or tensor tree), .csv (theta_l_deg,…) or .pab (PAB text)",
-                path.display()
-            ),
+            "csv" => {
+                let scan = Scan::parse(text).with_context(place)?;
+                shared::shared(&scan).with_context(place)?;
+                (Source::Scan(scan), stem, String::new())
+            }
+            _ => {
+                let scan = Pab::parse(text).with_context(place)?.scan();
+                (Source::Scan(scan), stem, String::new())
+            }
         };
+        let sha256 = Sha256::digest(bytes)
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect();
         Ok(Self {
             path: path.to_owned(),
             name,

@@ -275,11 +275,11 @@ fn parameters(s: &mut String, fit: &ModelFit, open: bool) {
         .expect(ok);
     }
     s.push_str("</table><ul>");
-    for line in fit
-        .uncertainty
-        .invisible
+    let u = &fit.uncertainty;
+    for line in text::offsets(fit)
         .iter()
-        .chain(&fit.uncertainty.entangled)
+        .chain(&u.invisible)
+        .chain(&u.entangled)
     {
         writeln!(s, "<li>{}", escape(line)).expect(ok);
     }

@@ -101,6 +101,12 @@ pub(crate) fn summary(
         aicc: 0.0,
         bic: 0.0,
         cross_validation_e4: best.cross_validation_e4,
+        offsets: full
+            .shared
+            .iter()
+            .zip(&best.offsets)
+            .map(|(s, z)| (s.kind, z * s.sigma, s.sigma))
+            .collect(),
         outcome,
         evaluations: best.evaluations,
         starts_agreeing: best.agreeing,

@@ -1,6 +1,7 @@
 //! Numbers as people read them, and the ranking as a table for a terminal.
 
 use crate::fit::{FitResult, ModelFit, Parameter};
+use crate::measurement::shared::Kind;
 use crate::rank::place_or_tie;
 use std::fmt::Write;
 
@@ -101,6 +102,9 @@ pub fn parameters(fit: &ModelFit) -> String {
         });
         writeln!(s, "    {:<11} {}{interval}", p.name, with_error(p)).expect(ok);
     }
+    if let Some(line) = offsets(fit) {
+        writeln!(s, "    {line}").expect(ok);
+    }
     if fit.uncertainty.rank < fit.uncertainty.free {
         writeln!(
             s,
@@ -118,6 +122,17 @@ pub fn parameters(fit: &ModelFit) -> String {
         writeln!(s, "    {line}").expect(ok);
     }
     s
+}
+
+/// What the fit says of errors that all rows share, in one line; none where there are none.
+pub fn offsets(fit: &ModelFit) -> Option<String> {
+    let one = |(kind, value, sigma): &(Kind, f64, f64)| {
+        let sign = if *value < 0.0 { "" } else { "+" };
+        let (name, value, sigma) = (kind.name(), number(*value), number(*sigma));
+        format!("{name} {sign}{value} (± {sigma} before)")
+    };
+    let list: Vec<String> = fit.offsets.iter().map(one).collect();
+    (!list.is_empty()).then(|| format!("shared errors as the fit finds them: {}", list.join(", ")))
 }
 
 /// Straight-through share in words.

@@ -14,8 +14,12 @@ use crate::scene::{LAYER_NAMES, LAYERS};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct PixelSum {
-    /// Radiance by light layer; the fourth numbers are the sums of: squared luminance, gap, depth, nothing.
-    pub light: [[f32; 4]; LAYERS],
+    /// Radiance by light layer scattered at most once; the fourth numbers are the sums of: its squared luminance, gap,
+    /// depth, nothing.
+    pub direct: [[f32; 4]; LAYERS],
+    /// Radiance by light layer scattered more often; the fourth numbers are the sums of: its squared luminance, the
+    /// product of this luminance and that of the direct part, nothing, nothing.
+    pub indirect: [[f32; 4]; LAYERS],
     /// Reflectance and transmittance of what is seen.
     pub albedo: [f32; 4],
     /// Shading normal of what is seen first.
@@ -26,19 +30,25 @@ impl PixelSum {
     /// Adds one sample.
     #[inline]
     pub(crate) fn add(&mut self, s: &Sample) {
-        let mut all = Vec3::ZERO;
-        for (sum, &l) in self.light.iter_mut().zip(&s.light) {
-            // A sample that is not a number must not spoil the pixel; it counts as black.
-            let l = if l.is_finite() { l } else { Vec3::ZERO };
-            all += l;
-            for c in 0..3 {
-                sum[c] += l[c];
+        let part = |sums: &mut [[f32; 4]; LAYERS], light: &[Vec3; LAYERS]| {
+            let mut all = Vec3::ZERO;
+            for (sum, &l) in sums.iter_mut().zip(light) {
+                // A sample that is not a number must not spoil the pixel; it counts as black.
+                let l = if l.is_finite() { l } else { Vec3::ZERO };
+                all += l;
+                for c in 0..3 {
+                    sum[c] += l[c];
+                }
             }
-        }
-        let lum = luminance(all);
-        self.light[0][3] += lum * lum;
-        self.light[1][3] += s.gap;
-        self.light[2][3] += s.depth;
+            luminance(all)
+        };
+        let direct = part(&mut self.direct, &s.direct);
+        let indirect = part(&mut self.indirect, &s.indirect);
+        self.direct[0][3] += direct * direct;
+        self.direct[1][3] += s.gap;
+        self.direct[2][3] += s.depth;
+        self.indirect[0][3] += indirect * indirect;
+        self.indirect[1][3] += direct * indirect;
         for c in 0..3 {
             self.albedo[c] += s.albedo[c];
             self.normal[c] += s.normal[c];
@@ -123,14 +133,28 @@ impl Accumulation {
     }
 
     /// The means as a film: "beauty", with `light_layers` one "light.NAME" each, with `aov` "albedo", "normal",
-    /// "depth" \[m\], "gap" and "variance" (of the mean of the luminance, taken from the samples' scatter).
+    /// "depth" \[m\], "gap", "variance" (of the mean of the luminance, from the samples' scatter, where there are at
+    /// least two), and "indirect" and "indirect.NAME": the share of light that was scattered before it came to what is
+    /// seen. "direct.variance" and "indirect.variance" are those of the two parts.
     #[must_use]
     pub fn film(&self, settings: &Settings) -> Film {
         let n = self.samples.max(1) as f32;
         let mut film = Film::new(self.width as usize, self.height as usize);
         let rgb = |v: &[f32; 4]| [v[0] / n, v[1] / n, v[2] / n];
+        let all = |lights: &[[f32; 4]; LAYERS]| -> [f32; 3] {
+            std::array::from_fn(|c| lights.iter().map(|l| l[c]).sum::<f32>() / n)
+        };
+        let direct = |p: &PixelSum| all(&p.direct);
+        let indirect = |p: &PixelSum| all(&p.indirect);
         let sum = |p: &PixelSum| -> [f32; 3] {
-            std::array::from_fn(|c| p.light.iter().map(|l| l[c]).sum::<f32>() / n)
+            let (a, b) = (direct(p), indirect(p));
+            std::array::from_fn(|c| a[c] + b[c])
+        };
+        // Variance of the mean of what has this mean and this sum of squares.
+        let variance = |mean: [f32; 3], squares: f32| {
+            let mean = luminance(Vec3::from(mean));
+            let scatter = (squares / n - mean * mean).max(0.0);
+            [scatter / (n - 1.0).max(1.0); 3]
         };
         let mut layer = |name: &str, f: &dyn Fn(&PixelSum) -> [f32; 3]| {
             film.push(name, self.pixels.iter().map(f).collect());
@@ -138,7 +162,10 @@ impl Accumulation {
         layer(BEAUTY, &sum);
         if settings.light_layers {
             for (i, name) in LAYER_NAMES.iter().enumerate() {
-                layer(&format!("light.{name}"), &|p| rgb(&p.light[i]));
+                layer(&format!("light.{name}"), &|p| {
+                    let (a, b) = (rgb(&p.direct[i]), rgb(&p.indirect[i]));
+                    std::array::from_fn(|c| a[c] + b[c])
+                });
             }
         }
         if settings.aov {
@@ -148,13 +175,25 @@ impl Accumulation {
                     .normalize_or_zero()
                     .into()
             });
-            layer("depth", &|p| [p.light[2][3] / n; 3]);
-            layer("gap", &|p| [p.light[1][3] / n; 3]);
-            layer("variance", &|p| {
-                let mean = luminance(Vec3::from(sum(p)));
-                let scatter = (p.light[0][3] / n - mean * mean).max(0.0);
-                [scatter / (n - 1.0).max(1.0); 3]
-            });
+            layer("depth", &|p| [p.direct[2][3] / n; 3]);
+            layer("gap", &|p| [p.direct[1][3] / n; 3]);
+            layer("indirect", &indirect);
+            // One sample does not tell its own scatter.
+            if self.samples > 1 {
+                layer("variance", &|p| {
+                    let [a, b] = [&p.direct, &p.indirect];
+                    variance(sum(p), a[0][3] + b[0][3] + 2.0 * b[1][3])
+                });
+                layer("direct.variance", &|p| variance(direct(p), p.direct[0][3]));
+                layer("indirect.variance", &|p| {
+                    variance(indirect(p), p.indirect[0][3])
+                });
+            }
+            if settings.light_layers {
+                for (i, name) in LAYER_NAMES.iter().enumerate() {
+                    layer(&format!("indirect.{name}"), &|p| rgb(&p.indirect[i]));
+                }
+            }
         }
         film.metadata
             .insert("samples".into(), self.samples.to_string());

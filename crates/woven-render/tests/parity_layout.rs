@@ -96,7 +96,7 @@ fn rows_lie_where_the_shader_reads_them() {
         m, Frame, eye, aperture, right, focus, up, width, forward, height, lens_x, depth, lens_y,
         seed, index, left, above, block, globals
     );
-    same!(m, PixelSum, light, albedo, normal);
+    same!(m, PixelSum, direct, indirect, albedo, normal);
     // Texture rows are read by words: the shader's constant is Rust's size.
     assert!(text.contains(&format!(
         "const TEXTURE_ROW: u32 = {}u;",

@@ -29,23 +29,23 @@ pub(crate) struct PlanArgs {
 /// What is known, and what is the choice.
 #[derive(Args)]
 pub(crate) struct NextArgs {
-    /// The fit so far, as a fabric file.
-    #[arg(long)]
+    /// The fit so far: the fabric file that `woven-fit fit --out` writes.
+    #[arg(long, value_name = "FABRIC.toml")]
     fabric: PathBuf,
     /// The plan whose poses are the choice.
-    #[arg(long)]
+    #[arg(long, value_name = "PLAN.toml")]
     plan: PathBuf,
     /// A log whose readings are already known; may be given more than once.
-    #[arg(long)]
+    #[arg(long, value_name = "LOG")]
     known: Vec<PathBuf>,
-    /// How many poses.
-    #[arg(long)]
+    /// How many readings.
+    #[arg(long, value_name = "N")]
     count: usize,
     /// Count only what these parameters gain, by name; without it all of them.
     #[arg(long = "for", value_delimiter = ',', value_name = "PARAMETER")]
     aims: Vec<String>,
     /// Count rate of the direct beam, counts a millisecond; that of the known log, or 600000.
-    #[arg(long)]
+    #[arg(long, value_name = "RATE")]
     beam: Option<f64>,
     /// The rig: shot, grbl, instant, or a TOML file.
     #[arg(long, default_value = "shot")]
@@ -96,8 +96,10 @@ pub(crate) fn next(args: &NextArgs) -> Result<()> {
     let beam = args.beam.or(logged).unwrap_or(600_000.0);
     let known: Vec<Pose> = known
         .iter()
-        .flat_map(|m| &m.samples)
-        .map(|s| s.pose)
+        .flat_map(|m| {
+            let scattered = m.samples.iter().map(|s| s.pose);
+            scattered.chain(m.direct.iter().map(|d| d.pose))
+        })
         .collect();
     let candidates = plan.route(&rig)?.poses;
     let design = Design::new(&fabric, &rig.detector, &plan.exposure, beam)?;
@@ -105,8 +107,30 @@ pub(crate) fn next(args: &NextArgs) -> Result<()> {
     let all: Vec<Pose> = known.iter().chain(&chosen).copied().collect();
     let (before, after) = (design.errors(&known), design.errors(&all));
     for ((name, before), after) in design.names().iter().zip(before).zip(after) {
-        println!("{name}: standard error {before:.3e} before, {after:.3e} after");
+        let told = |sigma: f64| {
+            if sigma.is_finite() {
+                format!("{sigma:.3e}")
+            } else {
+                "not seen".into()
+            }
+        };
+        println!(
+            "{name}: standard error {} before, {} after",
+            told(before),
+            told(after)
+        );
     }
+    let mut places: Vec<Pose> = Vec::new();
+    for pose in &chosen {
+        if !places.contains(pose) {
+            places.push(*pose);
+        }
+    }
+    println!(
+        "{} readings at {} poses; a pose that tells much is read more than once.",
+        chosen.len(),
+        places.len()
+    );
     plan.name = format!("{}, next {}", plan.name, args.count);
     plan.grid = Grid::List {
         poses: chosen.iter().map(Pose::angles).collect(),

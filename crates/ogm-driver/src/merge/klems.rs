@@ -160,6 +160,7 @@ mod tests {
                     pose,
                     transmittance: 0.1,
                     sigma: 0.001,
+                    own: 0.001,
                     scattered: 2.0,
                 });
             } else {
@@ -167,6 +168,7 @@ mod tests {
                     pose,
                     f: f(pose.light(), pose.view()),
                     sigma: 0.01,
+                    own: 0.01,
                 });
             }
         }
@@ -224,6 +226,7 @@ mod tests {
             pose: Pose::new(1.0, 2.0, 170.0, 3.0),
             f: 1.0,
             sigma: 1.0,
+            own: 1.0,
         });
         let e = m.klems_matrix().unwrap_err().to_string();
         assert!(

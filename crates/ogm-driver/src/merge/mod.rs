@@ -19,7 +19,7 @@ use crate::exposure::Rate;
 use crate::log::{self, Contents, Reading, Record, What};
 use crate::plan::Plan;
 use crate::pose::Pose;
-use crate::rig::Rig;
+use crate::rig::{Rig, Sight};
 use crate::sim::optics::beam_share;
 
 pub use export::write_whole;
@@ -180,17 +180,16 @@ pub fn merge_readings(readings: &[&Reading], plan: &Plan, rig: &Rig) -> Result<M
             continue;
         }
         let share = scale.share(rate);
-        let off = r.reached.from_straight();
-        // How far the arms may be from where they are thought to be: three standard deviations of both.
-        let margin = 3.0 * std::f64::consts::SQRT_2 * d.angle_deg;
-        if off < d.aperture_deg / 2.0 + d.beam_half_deg + margin {
-            // A pose meant to be straight through counts as such; others only where the whole beam surely is in the aperture.
-            if off <= (d.aperture_deg / 2.0 - d.beam_half_deg - margin).max(0.01) {
+        match d.sight(r.reached.from_straight()) {
+            Sight::Scattered => {}
+            Sight::Straight => {
                 straight.push((r.reached, share));
-            } else {
-                out.cut.push(r.reached);
+                continue;
             }
-            continue;
+            Sight::Cut => {
+                out.cut.push(r.reached);
+                continue;
+            }
         }
         let projected = d.solid_angle() * r.reached.view()[2].abs();
         if projected <= 1e-6 * d.solid_angle() {

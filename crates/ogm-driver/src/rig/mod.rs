@@ -12,7 +12,7 @@ use crate::protocol::shot;
 
 mod parts;
 
-pub use parts::{DetectorData, Holder, output_bits};
+pub use parts::{DetectorData, Holder, Sight, output_bits};
 
 /// The language of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -72,10 +72,45 @@ impl DetectorData {
         4.0 * std::f64::consts::PI * (half / 2.0).sin().powi(2)
     }
 
+    /// How far the arms may be from where they are thought to be, degrees: three standard deviations of both.
+    fn margin_deg(&self) -> f64 {
+        3.0 * std::f64::consts::SQRT_2 * self.angle_deg
+    }
+
+    /// Within this angle of straight through some of the beam may fall into the aperture, degrees.
+    pub fn blind_deg(&self) -> f64 {
+        self.aperture_deg / 2.0 + self.beam_half_deg + self.margin_deg()
+    }
+
+    /// What is seen of the beam at `off` degrees from straight through. A pose meant to be straight through counts as such; others only where the
+    /// whole beam surely is in the aperture.
+    pub fn sight(&self, off: f64) -> Sight {
+        if off >= self.blind_deg() {
+            Sight::Scattered
+        } else if off
+            <= (self.aperture_deg / 2.0 - self.beam_half_deg - self.margin_deg()).max(0.01)
+        {
+            Sight::Straight
+        } else {
+            Sight::Cut
+        }
+    }
+
     /// Relative standard uncertainty of the solid angle.
     pub fn solid_angle_sigma(&self) -> f64 {
         2.0 * self.aperture_sigma_deg / self.aperture_deg
     }
+}
+
+/// What the detector sees of the straight-through beam.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sight {
+    /// Nothing: scattered light alone.
+    Scattered,
+    /// The whole beam, surely.
+    Straight,
+    /// An unknown part of it, cut by the aperture's edge.
+    Cut,
 }
 
 /// A number that a rig file need not name.

@@ -3,12 +3,15 @@
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
-use ogm_driver::merge::Measurement;
+use ogm_driver::merge::{Measurement, merge_log};
+use ogm_driver::plan::Plan;
 use ogm_driver::rig::Rig;
+use ogm_driver::scan::{self, Quiet};
 use ogm_driver::sim::optics::{PlainCloth, Sample};
-use ogm_driver::sim::{Bench, Device, FaultPlan, Imperfections, PtyRig};
+use ogm_driver::sim::{Bench, Device, FaultPlan, Imperfections, MemoryTransport, PtyRig};
+use ogm_driver::transport::StopToken;
 
 /// A temporary folder in memory where the system has one: tests on virtual time are about the log's contents, not about how fast a disk syncs.
 pub(crate) fn quick_folder() -> tempfile::TempDir {
@@ -77,4 +80,29 @@ pub(crate) fn ogm(folder: &Path, arguments: &[&str]) -> String {
     let error = String::from_utf8_lossy(&done.stderr);
     assert!(done.status.success(), "ogm {arguments:?}: {error}");
     String::from_utf8_lossy(&done.stdout).into_owned()
+}
+
+/// Scans a sample in memory, on virtual time, and merges the log.
+pub(crate) fn measure(
+    rig: &Rig,
+    sample: Arc<dyn Sample>,
+    wrong: Imperfections,
+    plan: &Plan,
+) -> Measurement {
+    let device = Arc::new(Mutex::new(Device::new(
+        Bench::new(rig.clone(), sample, wrong),
+        FaultPlan::none(),
+    )));
+    let folder = quick_folder();
+    let log = folder.path().join("x.ogm");
+    scan::run(
+        Box::new(MemoryTransport::new(device)),
+        rig,
+        plan,
+        &log,
+        &StopToken::new(),
+        &mut Quiet,
+    )
+    .unwrap();
+    merge_log(&log).unwrap()
 }

@@ -1,5 +1,6 @@
 //! The instrument's kernels: over which directions each measured value is an average, for matrices and for scans.
 
+use super::shared::shared;
 use super::{Detail, Node, Point, Points};
 use std::f64::consts::PI;
 use woven_bsdf::angles::{degrees, radians};
@@ -140,6 +141,8 @@ pub(super) const STEEP_DEG: f64 = 89.9;
 
 pub(super) fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) -> Points {
     let mut out = Points::default();
+    // Lines that cannot be read are told by whoever reads the file or fits it.
+    (out.shared, _) = shared(scan).unwrap_or_default();
     let aperture = aperture(scan);
     let incidence = |out: &mut Points, l: Vec3<f64>| {
         // Directions that differ by less than a hundredth of a degree are one incidence.

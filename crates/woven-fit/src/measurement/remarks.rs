@@ -1,6 +1,8 @@
 //! What is odd about a scan's rows, said by row: twice the same directions, grazing angles, values below zero.
 
 use super::kernel::STEEP_DEG;
+use super::shared::shared;
+use crate::text::number;
 use std::collections::BTreeMap;
 use woven_bsdf::angles::radians;
 use woven_bsdf::measured::csv::Scan;
@@ -18,6 +20,22 @@ fn rows(list: &[usize]) -> String {
 /// Sentences about a scan; rows count from 1 after the header.
 pub(super) fn remarks(scan: &Scan) -> Vec<String> {
     let mut out = Vec::new();
+    let (known, unknown) = shared(scan).unwrap_or_default();
+    if !known.is_empty() {
+        let list: Vec<String> = known
+            .iter()
+            .map(|s| format!("{} {}", s.kind.name(), number(s.sigma)))
+            .collect();
+        out.push(format!(
+            "All rows share errors of the instrument ({}); the fit knows of them and the intervals hold them.",
+            list.join(", ")
+        ));
+    }
+    for name in unknown {
+        out.push(format!(
+            "The measurement names a shared error that this version does not know: {name}."
+        ));
+    }
     let mut seen: BTreeMap<[i64; 6], usize> = BTreeMap::new();
     let (mut twice, mut grazing, mut negative) = (Vec::new(), Vec::new(), Vec::new());
     let steep = radians(STEEP_DEG).cos();

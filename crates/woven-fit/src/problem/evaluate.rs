@@ -183,11 +183,16 @@ impl Evaluator<'_> {
         }
     }
 
-    /// Model values f = Σ k φ + fixed at all points.
-    pub fn model(&self, k: &[f64], x: &[f64]) -> Vec<f64> {
+    /// Model values f = Σ k φ + fixed at all points; none if a number is not finite.
+    pub fn values(&self, k: &[f64], x: &[f64]) -> Option<Vec<f64>> {
         let mut table = Table::default();
-        self.fill(x, false, &mut table);
-        combine(&table, k, self.m())
+        self.fill(x, false, &mut table)
+            .then(|| combine(&table, k, self.m()))
+    }
+
+    /// [`Self::values`] where a fit has shown that they are finite, and zeros otherwise.
+    pub fn model(&self, k: &[f64], x: &[f64]) -> Vec<f64> {
+        self.values(k, x).unwrap_or_else(|| vec![0.0; self.m()])
     }
 }
 

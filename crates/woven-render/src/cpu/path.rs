@@ -15,11 +15,12 @@ use crate::rng::Rng;
 use crate::scene::LAYERS;
 use crate::table::{MATT, MaterialRow, NONE, TRANSMITS, Table};
 
-/// Sheets at which a camera ray is lit (random numbers: set 0 is the camera's, then one set a crossing); beyond it goes on dark (the product of as many gaps is below any noise).
+/// Sheets at which a camera ray is lit (random numbers: set 0 is the camera's, then one set a crossing); beyond it goes
+/// on dark (the product of as many gaps is below any noise).
 const CROSSINGS: u32 = 64;
 
-/// A path survives with the probability of what it carries times this. Measured on the bench scene (relMSE x CPU-s at 160 x 120,
-/// 32 spp; `examples/measure.rs`): 1 gives 0.095, 2 0.070, 3 0.065, 5 0.076, no roulette 0.078.
+/// A path survives with the probability of what it carries times this. Measured on the bench scene (relMSE x CPU-s at
+/// 160 x 120, 32 spp; `examples/measure.rs`): 0.5 gives 0.042, 1 0.030, 3 0.022, 6 0.023, no roulette 0.023.
 const ROULETTE: f32 = 3.0;
 
 /// What is the same for all samples of a picture.
@@ -46,8 +47,10 @@ pub(crate) struct View {
 /// One sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sample {
-    /// Radiance by light layer.
-    pub light: [Vec3; LAYERS],
+    /// Radiance by light layer that was scattered at most once, at what the camera sees.
+    pub direct: [Vec3; LAYERS],
+    /// Radiance by light layer that was scattered before.
+    pub indirect: [Vec3; LAYERS],
     /// Reflectance and transmittance of what is seen, weighted like the picture.
     pub albedo: Vec3,
     /// Shading normal of what is seen first, towards the eye.
@@ -205,12 +208,12 @@ pub(super) fn begin(
     for crossing in 0..CROSSINGS {
         let Some(hit) = nearest(table, &ray, tmin, FAR) else {
             add(
-                &mut out.light,
+                &mut out.direct,
                 table.globals.sky_layer,
                 light::sky(table, ray.d) * passed,
             );
             light::discs(table, ray.d, |layer, l| {
-                add(&mut out.light, layer, l * passed);
+                add(&mut out.direct, layer, l * passed);
             });
             break;
         };
@@ -219,7 +222,7 @@ pub(super) fn begin(
         let wo = s.local(-ray.d);
         let gap = surface::gap(m, &s, ray.d);
         add(
-            &mut out.light,
+            &mut out.direct,
             m.layer,
             surface::emission(table, m, &s, -ray.d) * (passed * (1.0 - gap)),
         );
@@ -234,7 +237,7 @@ pub(super) fn begin(
             let at = place(table, m, &s, ray.d);
             let u = rng.set(1 + crossing);
             if let Some((l, value)) = incident(table, m, &s, &at, wo, u, &mut rng) {
-                add(&mut out.light, l.layer, value * passed);
+                add(&mut out.direct, l.layer, value * passed);
             }
             // Reservoir of one: each crossing is kept in proportion to its weight.
             all_weights += weight;
@@ -269,7 +272,7 @@ pub(super) fn begin(
     let mut second = None;
     if let Some(v) = &mut chosen {
         v.throughput *= all_weights / chosen_weight;
-        second = follow(table, view, v, paths, &mut out.light);
+        second = follow(table, view, v, paths, &mut out);
     }
     Begun {
         sample: out,
@@ -291,13 +294,13 @@ fn add(light: &mut [Vec3; LAYERS], layer: u32, value: Vec3) {
 }
 
 /// Follows the path that scatters at `first` until it ends. What it meets without a second scattering is added to
-/// `light`; what is scattered at the second point is returned, unless only this very path may use it.
+/// `own`, and so is what comes through the second point if only this very path may use it; the rest is returned.
 fn follow(
     table: &Table,
     view: &View,
     first: &Vertex,
     rng: &mut Rng,
-    light: &mut [Vec3; LAYERS],
+    own: &mut Sample,
 ) -> Option<Second> {
     let mut v = *first;
     let mut second: Option<Second> = None;
@@ -345,7 +348,8 @@ fn follow(
         let mut passed = 1.0;
         let mut give = |layer: u32, value: Vec3, tail: Vec3, alone: Vec3| match &mut second {
             Some(y) if lent => add(&mut y.beyond, layer, value * tail),
-            _ => add(light, layer, value * alone),
+            Some(_) => add(&mut own.indirect, layer, value * alone),
+            None => add(&mut own.direct, layer, value * alone),
         };
         // Straight on through gaps, each by a coin.
         let (hit, s, gap) = loop {

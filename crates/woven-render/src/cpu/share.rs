@@ -116,7 +116,7 @@ fn gather(table: &Table, group: &mut [Option<Begun>; GROUP], coins: &[f32; GROUP
             };
             let carry = sight.carry * (1.0 / (q * all));
             let wo = y.s.local(-sight.d);
-            let light = &mut b.sample.light;
+            let light = &mut b.sample.indirect;
             light[y.lit.layer as usize] += y.lit.scattered(m, &y.s, wo) * carry;
             let f = surface::evaluate(m, &y.s, y.s.local(y.wi), wo) * carry;
             for (sum, &beyond) in light.iter_mut().zip(&y.beyond) {

@@ -67,7 +67,7 @@ impl Frame {
 }
 
 /// Bytes of the shader's `Slot`; a test compares them.
-pub const SLOT: u64 = 1424;
+pub const SLOT: u64 = 1504;
 /// Most blocks of one submit: their slots take about 100 MB.
 const RANGE: u32 = 1024;
 
@@ -107,7 +107,7 @@ impl Buffers {
             size,
             Use::STORAGE | Use::COPY_DST | Use::COPY_SRC,
         )?;
-        let size = u64::from(range(view.width, view.height)) * 64 * SLOT;
+        let size = u64::from(range(view.width, view.height) * BLOCK * BLOCK) * SLOT;
         let slots = buffer(device, "paths", size, Use::STORAGE)?;
         let scene = upload(device, table)?;
         let group = bind(device, pipeline, &frame, &scene, [&sums, &slots]);

@@ -28,15 +28,20 @@ struct Begun {
 
 // What one sample adds.
 struct Taken {
-    light: array<vec3<f32>, LAYERS>,
+    direct: array<vec3<f32>, LAYERS>,
+    indirect: array<vec3<f32>, LAYERS>,
     albedo: vec3<f32>,
     normal: vec3<f32>,
     depth: f32,
     gap: f32,
 }
 
-fn add_light(out: ptr<function, Taken>, layer: u32, value: vec3<f32>) {
-    (*out).light[min(layer, LAYERS - 1u)] += value;
+fn add_light(out: ptr<function, Taken>, indirect: bool, layer: u32, value: vec3<f32>) {
+    if (indirect) {
+        (*out).indirect[min(layer, LAYERS - 1u)] += value;
+    } else {
+        (*out).direct[min(layer, LAYERS - 1u)] += value;
+    }
 }
 
 fn towards_eye(s: Surface, d: vec3<f32>) -> vec3<f32> {
@@ -187,7 +192,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
             if (lent) {
                 add_beyond(&second, layer, given * tail * share);
             } else {
-                add_light(&out, layer, given * carry * share);
+                add_light(&out, begun.has_second, layer, given * carry * share);
             }
         }
         var scatter = false;
@@ -236,7 +241,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
                 } else if (lent) {
                     add_beyond(&second, lit.layer, lit.value * tail);
                 } else {
-                    add_light(&out, lit.layer, lit.value * carry);
+                    add_light(&out, begun.has_second, lit.layer, lit.value * carry);
                 }
                 if (camera) {
                     // Reservoir of one: each crossing is kept in proportion to its weight.
@@ -331,7 +336,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
 fn add_discs(out: ptr<function, Taken>, d: vec3<f32>, passed: f32) {
     for (var i = frame.globals.others; i < frame.globals.lights; i++) {
         if (lights[i].kind == SUN && lights[i].u.y > 1e-4 && dot(d, lights[i].n) > lights[i].u.x) {
-            add_light(out, lights[i].layer, lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
+            add_light(out, false, lights[i].layer, lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
         }
     }
 }

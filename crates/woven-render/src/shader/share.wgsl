@@ -8,45 +8,45 @@ const GROUP: u32 = 64u;
 const KEPT: f32 = 16.0;
 const PATHS: u32 = 0x70617468u;
 
-// What the passes leave to each other for one pixel.
-struct Slot {
-    // Where the camera ray is scattered; no material: nowhere.
+// A point of a sheet, as the passes leave it to each other.
+struct Point {
     p: vec3<f32>,
+    // None: no point.
     material: u32,
     ng: vec3<f32>,
     alpha: f32,
     fx: vec3<f32>,
+    fz: vec3<f32>,
+    tint: vec3<f32>,
+}
+
+// What the passes leave to each other for one pixel.
+struct Slot {
+    // Where the camera ray is scattered.
+    first: Point,
+    wo: vec3<f32>,
     // Of the gaps on the own path's way to its second point.
     passed: f32,
-    fz: vec3<f32>,
+    throughput: vec3<f32>,
     // Decides whether the second point is kept.
     coin: f32,
-    wo: vec3<f32>,
+    second: SecondRow,
     // What the second point scatters, about.
     brightness: f32,
-    tint: vec3<f32>,
-    throughput: vec3<f32>,
-    second: SecondRow,
     taken: PixelSum,
     // Of the second points that are kept, in order: density and what the pixel takes of their light.
     sights: array<vec4<f32>, GROUP>,
 }
 
 struct SecondRow {
-    p: vec3<f32>,
-    material: u32,
-    ng: vec3<f32>,
-    alpha: f32,
-    fx: vec3<f32>,
+    point: Point,
+    lit_wi: vec3<f32>,
+    pdf: f32,
+    light: vec3<f32>,
+    layer: u32,
+    wi: vec3<f32>,
     // 1: who looks has it before him.
     side: u32,
-    fz: vec3<f32>,
-    layer: u32,
-    tint: vec3<f32>,
-    pdf: f32,
-    lit_wi: vec3<f32>,
-    light: vec3<f32>,
-    wi: vec3<f32>,
     beyond: array<vec4<f32>, LAYERS>,
 }
 
@@ -76,7 +76,7 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     let slot = workgroup.x * GROUP + member;
     let corner = corner_of(frame.block + workgroup.x);
     let pixel = corner + vec2<i32>(vec2<u32>(member % BLOCK, member / BLOCK));
-    slots[slot].material = NONE;
+    slots[slot].first.material = NONE;
     slots[slot].brightness = 0.0;
     if (!inside(pixel)) {
         return;
@@ -88,22 +88,17 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     let b = begin(u32(pixel.x), u32(pixel.y), &paths);
     slots[slot].coin = rng_coin(&paths);
     for (var k = 0u; k < LAYERS; k++) {
-        slots[slot].taken.light[k] = vec4<f32>(b.taken.light[k], 0.0);
+        slots[slot].taken.direct[k] = vec4<f32>(b.taken.direct[k], 0.0);
+        slots[slot].taken.indirect[k] = vec4<f32>(b.taken.indirect[k], 0.0);
     }
-    slots[slot].taken.light[1].w = b.taken.gap;
-    slots[slot].taken.light[2].w = b.taken.depth;
+    slots[slot].taken.direct[1].w = b.taken.gap;
+    slots[slot].taken.direct[2].w = b.taken.depth;
     slots[slot].taken.albedo = vec4<f32>(b.taken.albedo, 0.0);
     slots[slot].taken.normal = vec4<f32>(b.taken.normal, 0.0);
     if (!b.has_first) {
         return;
     }
-    slots[slot].material = b.first.s.material;
-    slots[slot].p = b.first.s.p;
-    slots[slot].ng = b.first.s.ng;
-    slots[slot].alpha = b.first.s.alpha;
-    slots[slot].fx = b.first.s.fx;
-    slots[slot].fz = b.first.s.fz;
-    slots[slot].tint = b.first.s.tint;
+    slots[slot].first = point_of(b.first.s);
     slots[slot].wo = b.first.wo;
     slots[slot].throughput = b.first.throughput;
     if (!b.has_second) {
@@ -111,15 +106,9 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     }
     slots[slot].brightness = brightness(b.second);
     slots[slot].passed = b.second.passed;
-    slots[slot].second.p = b.second.s.p;
-    slots[slot].second.material = b.second.s.material;
-    slots[slot].second.ng = b.second.s.ng;
-    slots[slot].second.alpha = b.second.s.alpha;
-    slots[slot].second.fx = b.second.s.fx;
+    slots[slot].second.point = point_of(b.second.s);
     slots[slot].second.side = u32(dot(b.second.s.ng, b.second.s.p - b.first.s.p) < 0.0);
-    slots[slot].second.fz = b.second.s.fz;
     slots[slot].second.layer = b.second.lit.layer;
-    slots[slot].second.tint = b.second.s.tint;
     slots[slot].second.pdf = b.second.lit.pdf;
     slots[slot].second.lit_wi = b.second.lit.wi;
     slots[slot].second.light = b.second.lit.light;
@@ -143,29 +132,20 @@ fn total_of(base: u32) -> f32 {
     return total;
 }
 
-fn first_surface(i: u32) -> Surface {
-    var s: Surface;
-    s.p = slots[i].p;
-    s.ng = slots[i].ng;
-    s.fx = slots[i].fx;
-    s.fz = slots[i].fz;
-    s.fy = cross(s.fz, s.fx);
-    s.material = slots[i].material;
-    s.tint = slots[i].tint;
-    s.alpha = slots[i].alpha;
-    return s;
+fn point_of(s: Surface) -> Point {
+    return Point(s.p, s.material, s.ng, s.alpha, s.fx, s.fz, s.tint);
 }
 
-fn second_surface(i: u32) -> Surface {
+fn surface_of(point: Point) -> Surface {
     var s: Surface;
-    s.p = slots[i].second.p;
-    s.ng = slots[i].second.ng;
-    s.fx = slots[i].second.fx;
-    s.fz = slots[i].second.fz;
-    s.fy = cross(s.fz, s.fx);
-    s.material = slots[i].second.material;
-    s.tint = slots[i].second.tint;
-    s.alpha = slots[i].second.alpha;
+    s.p = point.p;
+    s.ng = point.ng;
+    s.fx = point.fx;
+    s.fz = point.fz;
+    s.fy = cross(point.fz, point.fx);
+    s.material = point.material;
+    s.tint = point.tint;
+    s.alpha = point.alpha;
     return s;
 }
 
@@ -174,10 +154,10 @@ fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_in
     let base = workgroup.x * GROUP;
     let slot = base + member;
     let total = total_of(base);
-    let has = slots[slot].material != NONE;
+    let has = slots[slot].first.material != NONE;
     var x: Surface;
     if (has) {
-        x = first_surface(slot);
+        x = surface_of(slots[slot].first);
     }
     // No coin is tossed on the way.
     var unused = Rng(0u, 0u, 0u);
@@ -189,17 +169,17 @@ fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_in
         }
         var sight = vec4<f32>(0.0);
         if (has) {
-            let y = slots[i].second.p;
+            let y = slots[i].second.point.p;
             let begin = leave(x, y - x.p);
             let to = y - begin;
             let distance2 = max(length2(to), 1e-12);
             let distance = sqrt(distance2);
             let d = to * (1.0 / distance);
-            let c = dot(slots[i].second.ng, d);
+            let c = dot(slots[i].second.point.ng, d);
             if ((c < 0.0) == (slots[i].second.side == 1u)) {
                 let wi = local(x, d);
                 let b = scattering(x.material, x, slots[slot].wo, wi, false, vec3<f32>(0.0));
-                let density = b.pdf * (1.0 - gap_of(slots[i].second.material, second_surface(i), d));
+                let density = b.pdf * (1.0 - gap_of(slots[i].second.point.material, surface_of(slots[i].second.point), d));
                 if (density > 0.0) {
                     var passed = slots[slot].passed;
                     if (k != member) {
@@ -218,6 +198,11 @@ fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_in
     }
 }
 
+// A sample that is not a number must not spoil the pixel; it counts as black.
+fn finite(l: vec3<f32>) -> vec3<f32> {
+    return select(vec3<f32>(0.0), l, all(abs(l) < vec3<f32>(1e30)));
+}
+
 @compute @workgroup_size(64, 1, 1)
 fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
     let pixel = corner_of(frame.block + workgroup.x) + vec2<i32>(vec2<u32>(member % BLOCK, member / BLOCK));
@@ -229,11 +214,11 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     let total = total_of(base);
     var light: array<vec3<f32>, LAYERS>;
     for (var k = 0u; k < LAYERS; k++) {
-        light[k] = slots[slot].taken.light[k].xyz;
+        light[k] = slots[slot].taken.indirect[k].xyz;
     }
     var x: Surface;
-    if (slots[slot].material != NONE) {
-        x = first_surface(slot);
+    if (slots[slot].first.material != NONE) {
+        x = surface_of(slots[slot].first);
     }
     var n = 0u;
     for (var m = 0u; m < GROUP; m++) {
@@ -249,7 +234,7 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
                 all_densities += slots[base + k].sights[n].w;
             }
             let carry = sight.xyz * (1.0 / (q * all_densities));
-            let s = second_surface(i);
+            let s = surface_of(slots[i].second.point);
             let to = s.p - leave(x, s.p - x.p);
             let wo = local(s, to * (-1.0 / sqrt(max(length2(to), 1e-12))));
             // Light that was sampled there, then what the path found beyond: one place for the scattering.
@@ -274,13 +259,19 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     }
     let place = u32(pixel.y) * frame.width + u32(pixel.x);
     var sum = vec3<f32>(0.0);
+    var direct = vec3<f32>(0.0);
     for (var k = 0u; k < LAYERS; k++) {
-        let l = select(vec3<f32>(0.0), light[k], all(abs(light[k]) < vec3<f32>(1e30)));
+        let l = finite(light[k]);
         sum += l;
-        sums[place].light[k] += vec4<f32>(l, slots[slot].taken.light[k].w);
+        sums[place].indirect[k] += vec4<f32>(l, 0.0);
+        let d = finite(slots[slot].taken.direct[k].xyz);
+        direct += d;
+        sums[place].direct[k] += vec4<f32>(d, slots[slot].taken.direct[k].w);
     }
-    let lum = luminance(sum);
-    sums[place].light[0].w += lum * lum;
+    let lum = vec2<f32>(luminance(direct), luminance(sum));
+    sums[place].direct[0].w += lum.x * lum.x;
+    sums[place].indirect[0].w += lum.y * lum.y;
+    sums[place].indirect[1].w += lum.x * lum.y;
     sums[place].albedo += slots[slot].taken.albedo;
     sums[place].normal += slots[slot].taken.normal;
 }

@@ -124,7 +124,8 @@ struct Frame {
 }
 
 struct PixelSum {
-    light: array<vec4<f32>, 4>,
+    direct: array<vec4<f32>, 4>,
+    indirect: array<vec4<f32>, 4>,
     albedo: vec4<f32>,
     normal: vec4<f32>,
 }

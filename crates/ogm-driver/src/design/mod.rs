@@ -4,13 +4,13 @@
 
 use woven_bsdf::fabric::Fabric;
 use woven_bsdf::model::{self, Role};
-use woven_bsdf::vec3::Vec3;
 
 use crate::error::{Error, Result};
 use crate::exposure::Exposures;
 use crate::pose::Pose;
 use crate::rig::DetectorData;
-use crate::sim::optics::crossways;
+
+mod reading;
 
 /// A model at the parameters of the fit so far, and the noise of a reading.
 pub struct Design {
@@ -21,11 +21,6 @@ pub struct Design {
     exposures: Exposures,
     beam: f64,
 }
-
-/// Relative error of a reading that no exposure takes away, beside what the rig file states: what repeats of one pose differ by on a good day.
-const FLOOR: f64 = 5e-4;
-/// Step for slopes over directions, radians.
-const TILT: f64 = 2e-3;
 
 impl Design {
     /// Around the optics of a fabric file; `beam` is the count rate of the direct beam, counts a millisecond.
@@ -78,65 +73,6 @@ impl Design {
     /// Names of the parameters, in the order of [`Design::errors`].
     pub fn names(&self) -> Vec<&'static str> {
         self.model.params.iter().map(|p| p.name).collect()
-    }
-
-    fn f(&self, values: &[f64], l: [f64; 3], v: [f64; 3]) -> f64 {
-        let vec = |d: [f64; 3]| Vec3::new(d[0], d[1], d[2]);
-        self.model.eval(values, vec(l), vec(v))
-    }
-
-    /// Standard error of one reading of f at a pose, 1/sr, as the merge states it: shot and read noise at the longest exposure that fits, the floor,
-    /// the angles' error times the slope, and the aperture's blur.
-    fn sigma(&self, pose: &Pose, f: f64) -> f64 {
-        let d = &self.detector;
-        let per_ms = self.beam * d.solid_angle() * pose.view()[2].abs().max(1e-3);
-        let fits = |t: &f64| per_ms * f.max(0.0) * t <= 0.7 * d.full_scale;
-        let ladder = &self.exposures.ladder_ms;
-        let t = ladder.iter().copied().rfind(fits).unwrap_or(ladder[0]);
-        let noise = (per_ms * f.max(0.0) * t / d.electrons_per_count + d.read_noise.powi(2)).sqrt();
-        let floor = FLOOR.hypot(d.reference_noise).hypot(d.linearity) * f;
-        let (slope, curvature) = self.shape(pose, f);
-        let radius = (d.aperture_deg / 2.0).to_radians();
-        let angle = d.angle_deg.to_radians() * std::f64::consts::SQRT_2;
-        [floor, slope * angle, radius * radius / 8.0 * curvature]
-            .into_iter()
-            .fold(noise / (per_ms * t), f64::hypot)
-    }
-
-    /// Magnitudes of the slope of f over the view direction (per radian) and of its Laplacian (per square radian).
-    fn shape(&self, pose: &Pose, f: f64) -> (f64, f64) {
-        let (l, v) = (pose.light(), pose.view());
-        let (x, y) = crossways(v);
-        let tilted = |t: [f64; 3], angle: f64| {
-            let (s, c) = angle.sin_cos();
-            self.f(&self.values, l, [0, 1, 2].map(|i| c * v[i] + s * t[i]))
-        };
-        let [east, west, north, south] =
-            [(x, TILT), (x, -TILT), (y, TILT), (y, -TILT)].map(|(t, angle)| tilted(t, angle));
-        let slope = (east - west).hypot(north - south) / (2.0 * TILT);
-        let laplacian = (east + west + north + south - 4.0 * f) / (TILT * TILT);
-        let known = |x: f64| if x.is_finite() { x.abs() } else { 0.0 };
-        (known(slope), known(laplacian))
-    }
-
-    /// Gradient of f over the scaled parameters, divided by the reading's standard error.
-    fn row(&self, pose: &Pose) -> Vec<f64> {
-        let (l, v) = (pose.light(), pose.view());
-        let f = self.f(&self.values, l, v);
-        let sigma = self.sigma(pose, f);
-        (0..self.values.len())
-            .map(|k| {
-                // Central difference; 1e-5 of the scale balances rounding and curvature.
-                let h = 1e-5 * self.scales[k];
-                let at = |sign: f64| {
-                    let mut values = self.values.clone();
-                    values[k] += sign * h;
-                    self.f(&values, l, v)
-                };
-                let slope = (at(1.0) - at(-1.0)) / (2.0 * h) * self.scales[k] / sigma;
-                if slope.is_finite() { slope } else { 0.0 }
-            })
-            .collect()
     }
 
     /// Standard errors of the parameters after readings at `poses`; infinite for what they cannot see.
@@ -321,5 +257,51 @@ mod tests {
             e[at("alpha_x")].is_finite() && e[at("alpha_y")] > 10.0 * e[at("alpha_x")],
             "{e:?}"
         );
+    }
+
+    #[test]
+    fn straight_through_readings_tell_of_the_gap_alone() {
+        let fabric = Fabric::from_toml("name = 's'\n[optics]\nmodel = 'sheet'\nparameters = { t_d = 0.25, k_t = 0.2, gamma_warp = 0.6, gamma_weft = 0.5, section = 1.0, alpha_x = 0.3, alpha_y = 0.15 }").unwrap();
+        let design = Design::new(
+            &fabric,
+            &DetectorData::default(),
+            &Exposures::default(),
+            6e5,
+        )
+        .unwrap();
+        let at = |name: &str| design.names().iter().position(|n| *n == name).unwrap();
+        let straight: Vec<Pose> = [
+            (0.0, 0.0),
+            (20.0, 0.0),
+            (40.0, 0.0),
+            (20.0, 90.0),
+            (40.0, 90.0),
+        ]
+        .map(|(theta, phi): (f64, f64)| Pose::new(theta, phi, 180.0 - theta, phi - 180.0))
+        .to_vec();
+        let e = design.errors(&straight);
+        assert!(
+            e[at("gamma_warp")] < 0.01 && e[at("gamma_weft")] < 0.01,
+            "{e:?}"
+        );
+        assert!(
+            e[at("k_t")].is_infinite() && e[at("alpha_x")].is_infinite(),
+            "{e:?}"
+        );
+        // The lobe's width is told by poses that see the lobe, and with the gap well known by them alone; never by one where the aperture cuts the beam.
+        let cut = Pose::new(0.0, 0.0, 179.5, 0.0);
+        let lobe: Vec<Pose> = (1..20)
+            .map(|k| Pose::new(0.0, 0.0, 180.0 - 4.0 * f64::from(k), 0.0))
+            .collect();
+        let all: Vec<Pose> = straight
+            .iter()
+            .chain([&cut])
+            .chain(&lobe)
+            .copied()
+            .collect();
+        let choose = |known: &[Pose]| design.choose(&all, known, 12, &["alpha_x".into()]).unwrap();
+        let (first, later) = (choose(&[]), choose(&straight.repeat(10_000)));
+        assert!(!first.contains(&cut) && first.iter().any(|p| lobe.contains(p)));
+        assert!(later.iter().all(|p| lobe.contains(p)), "{later:?}");
     }
 }

@@ -87,6 +87,9 @@ pub struct Material {
     pub emission: [f32; 3],
     /// Multiplies the factors `linear`.
     pub color_texture: Option<TextureUse>,
+    /// The reflection lobe keeps its colour where `color_texture` and coloured vertices multiply the other factors: the gloss of
+    /// everything that is no metal.
+    pub plain_gloss: bool,
     /// Its alpha channel multiplies the coverage by yarn: gap = 1 - a (1 - openness).
     pub coverage_texture: Option<TextureUse>,
     /// With a cut-off, alpha below it is a hole and alpha above it is solid (glTF's MASK).
@@ -303,6 +306,7 @@ impl Material {
             shape: crate::optics::constant_coverage(1.0 - gap),
             emission: [0.0; 3],
             color_texture: None,
+            plain_gloss: false,
             coverage_texture: None,
             alpha_cutoff: None,
             emission_texture: None,

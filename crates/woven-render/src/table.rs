@@ -92,6 +92,8 @@ pub const TRANSMITS: u32 = 4;
 pub const EMITS: u32 = 8;
 /// [`MaterialRow::flags`]: the same cover in every direction.
 pub const EVEN: u32 = 16;
+/// [`MaterialRow::flags`]: textures do not colour the reflection lobe.
+pub const PLAIN_GLOSS: u32 = 32;
 
 /// A texture and how to reach it.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -451,6 +453,7 @@ fn material_row(
     set(!black(0) || !black(1), TRANSMITS);
     set(m.emission.iter().any(|&e| e > 0.0), EMITS);
     set(even, EVEN);
+    set(m.plain_gloss, PLAIN_GLOSS);
     MaterialRow {
         linear: m.linear.map(|k| [k[0], k[1], k[2], 0.0]),
         shape: m.shape,

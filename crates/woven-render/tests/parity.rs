@@ -264,6 +264,8 @@ fn small_copies_bent_normals_and_coloured_vertices() {
     scene.materials[1].normal_texture = Some(used(1, 3.0));
     scene.materials[3].normal_texture = Some(used(1, 7.0));
     scene.materials[3].normal_scale = 0.7;
+    scene.materials[3].color_texture = Some(used(0, 2.0));
+    scene.materials[3].plain_gloss = true;
     let glow = scene.materials.len();
     scene.materials.push(Material {
         emission_texture: Some(used(0, 1.0)),

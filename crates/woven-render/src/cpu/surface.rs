@@ -6,7 +6,9 @@ use std::f32::consts::FRAC_1_PI;
 use super::bvh::Hit;
 use super::math::sincos_turn;
 use crate::optics;
-use crate::table::{DOUBLE_SIDED, EMITS, EVEN, MATT, MaterialRow, NONE, Table, TextureRow};
+use crate::table::{
+    DOUBLE_SIDED, EMITS, EVEN, MATT, MaterialRow, NONE, PLAIN_GLOSS, Table, TextureRow,
+};
 
 /// A point of a sheet, seen along a ray.
 #[derive(Clone, Copy, Debug)]
@@ -342,7 +344,12 @@ pub(crate) fn evaluate(m: &MaterialRow, s: &Surface, wi: Vec3, wo: Vec3) -> Vec3
         return k(j) * scale * (m.cover * FRAC_1_PI);
     }
     let b = optics::sheet_basis(&m.shape, wi, wo);
-    (k(0) * b[0] + k(1) * b[1] + k(2) * b[2] + k(3) * b[3]) * scale
+    let gloss = if m.flags & PLAIN_GLOSS != 0 {
+        Vec3::splat(s.alpha)
+    } else {
+        scale
+    };
+    (k(0) * b[0] + k(1) * b[1] + k(2) * b[2]) * scale + k(3) * b[3] * gloss
 }
 
 /// Density of [`sample`].

@@ -312,7 +312,8 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
         pdf = sheet_pdf(shape, weights, wo, wi);
     }
     let basis = sheet_basis(shape, wi, wo);
-    let f = materials[m].linear[0].xyz * basis[0] + materials[m].linear[1].xyz * basis[1]
-        + materials[m].linear[2].xyz * basis[2] + materials[m].linear[3].xyz * basis[3];
-    return Scattered(wi, f * scale, pdf);
+    let f = (materials[m].linear[0].xyz * basis[0] + materials[m].linear[1].xyz * basis[1]
+        + materials[m].linear[2].xyz * basis[2]) * scale
+        + materials[m].linear[3].xyz * basis[3] * select(scale, vec3<f32>(s.alpha), (flags & PLAIN_GLOSS) != 0u);
+    return Scattered(wi, f, pdf);
 }

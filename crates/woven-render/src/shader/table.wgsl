@@ -18,6 +18,7 @@ const DOUBLE_SIDED: u32 = 2u;
 const TRANSMITS: u32 = 4u;
 const EMITS: u32 = 8u;
 const EVEN: u32 = 16u;
+const PLAIN_GLOSS: u32 = 32u;
 
 // LightRow.kind
 const RECT: u32 = 0u;

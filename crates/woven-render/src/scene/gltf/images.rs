@@ -86,6 +86,33 @@ impl<'a> Pictures<'a> {
         Ok(self.textures.len() - 1)
     }
 
+    /// A copy of a colour texture with `veil` over it: (under c + veil) / (under + veil), so that with the factor under + veil
+    /// only what lies under the veil takes the picture's colour.
+    pub(super) fn veiled(
+        &mut self,
+        texture: usize,
+        under: [f32; 3],
+        veil: [f32; 3],
+    ) -> Result<usize> {
+        self.count(self.textures[texture].pixels.len() as u64 * 4)?;
+        let mut copy = self.textures[texture].clone();
+        for c in 0..3 {
+            let all = (under[c] + veil[c]).max(1e-6);
+            let table: Vec<u8> = (0..=255_u8)
+                .map(|b| {
+                    let below = crate::film::srgb_decode(f32::from(b) / 255.0) * under[c];
+                    let seen = crate::film::srgb_encode(((below + veil[c]) / all).clamp(0.0, 1.0));
+                    (seen * 255.0 + 0.5) as u8
+                })
+                .collect();
+            copy.pixels
+                .iter_mut()
+                .for_each(|p| p[c] = table[p[c] as usize]);
+        }
+        self.textures.push(copy);
+        Ok(self.textures.len() - 1)
+    }
+
     /// Mean of the four channels as stored, 0..=1.
     pub(super) fn mean(&mut self, texture: &gltf::Texture<'_>) -> Result<[f32; 4]> {
         let picture = self.picture(&texture.source())?;
@@ -149,6 +176,7 @@ impl<'a> Pictures<'a> {
             }
         };
         self.read += bytes.len() as u64;
+        let bytes = &plain(bytes).with_context(told)?;
         let (format, w, h) = measure(bytes).with_context(told)?;
         self.count(u64::from(w) * u64::from(h) * 4)
             .with_context(told)?;
@@ -166,6 +194,7 @@ type Pixels = (u32, u32, Vec<[u8; 4]>);
 /// # Errors
 /// A sentence when it is neither, is broken, or unfolds to more than [`FREE`] and [`UNFOLDS`] times its bytes.
 pub fn decode_picture(bytes: &[u8]) -> Result<Pixels> {
+    let bytes = &plain(bytes)?;
     let (format, w, h) = measure(bytes)?;
     ensure!(
         u64::from(w) * u64::from(h) * 4 <= FREE + UNFOLDS * bytes.len() as u64,
@@ -173,6 +202,15 @@ pub fn decode_picture(bytes: &[u8]) -> Result<Pixels> {
         bytes.len()
     );
     decode(bytes, format, w, h)
+}
+
+/// A checked PNG without what is not needed; any other file as it is.
+fn plain(bytes: &[u8]) -> Result<std::borrow::Cow<'_, [u8]>> {
+    if !bytes.starts_with(b"\x89PNG") {
+        return Ok(bytes.into());
+    }
+    super::png::check(bytes)?;
+    Ok(super::png::plain(bytes))
 }
 
 /// Format and sides by the header.
@@ -184,9 +222,6 @@ fn measure(bytes: &[u8]) -> Result<(image::ImageFormat, u32, u32)> {
     let (w, h) = image::ImageReader::with_format(Cursor::new(bytes), format)
         .into_dimensions()
         .map_err(|e| anyhow!("it cannot be read: {e}"))?;
-    if format == image::ImageFormat::Png {
-        super::png::check(bytes)?;
-    }
     ensure!(w > 0 && h > 0, "it has no pixels");
     ensure!(
         w <= MAX_SIDE && h <= MAX_SIDE,

@@ -13,6 +13,7 @@
 //!
 //! * sheen (KHR_materials_sheen) has no lobe of its own in the sheet. Its colour joins the diffuse reflection with the share that
 //!   the sheen's lobe reflects on the mean, and dims what lies below by as much: the colour and the energy are right, the bright rim is not.
+//! * the gloss of what is no metal stays white where a texture colours the rest.
 
 use super::images::Pictures;
 use crate::scene::{LAYER_LAMPS, MAX_LINEAR, Material, TextureUse};
@@ -133,11 +134,18 @@ pub(super) fn convert(
         layer: LAYER_LAMPS,
         ..Material::matt(&name, [0.0; 3])
     };
+    // Metal reflects its own colour, everything else white.
+    material.plain_gloss = metallic < 0.5;
     let mut sets = Vec::new();
     material.color_texture = pbr
         .base_color_texture()
         .map(|i| pictures.used(&i, true, &mut sets))
         .transpose()?;
+    if let Some(used) = material.color_texture.as_mut().filter(|_| below < 1.0) {
+        // The sheen lies on top of the picture and must not be coloured by it.
+        let under = [0, 1, 2].map(|c| (k[linear::R_D][c] - sheen[c]).max(0.0));
+        used.texture = pictures.veiled(used.texture, under, sheen)?;
+    }
     if m.alpha_mode() != AlphaMode::Opaque {
         material.coverage_texture = material.color_texture;
     }

@@ -1,6 +1,7 @@
 //! A look at the chunks of a PNG before its decoder sees them: what the format forbids and the decoder trusts.
 
 use anyhow::{Context, Result, ensure};
+use std::borrow::Cow;
 
 /// Checks the order and lengths of the chunks that decoding follows (PNG, third edition, 11.2 and 11.3.1).
 ///
@@ -47,6 +48,30 @@ pub(super) fn check(bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
+/// The file without what a picture does not need but a decoder unpacks: colour profiles and compressed texts, 256 MiB of
+/// which fit into 300 KB. The file has passed [`check`].
+pub(super) fn plain(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let mut out = Vec::new();
+    let (mut at, mut copied) = (8, 0);
+    while let Some(head) = bytes.get(at..at + 8) {
+        let length = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let end = (at + 12 + length).min(bytes.len());
+        if matches!(&head[4..], b"iCCP" | b"zTXt" | b"iTXt" | b"tEXt" | b"eXIf") {
+            out.extend(&bytes[copied..at]);
+            copied = end;
+        }
+        if &head[4..] == b"IEND" {
+            break;
+        }
+        at = end;
+    }
+    if copied == 0 {
+        return Cow::Borrowed(bytes);
+    }
+    out.extend(&bytes[copied..]);
+    Cow::Owned(out)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,6 +86,22 @@ mod tests {
             out.extend([0; 4]);
         }
         out
+    }
+
+    #[test]
+    fn profiles_and_texts_are_left_out() {
+        let kept = chunks(&[(b"IHDR", 13), (b"PLTE", 6), (b"IDAT", 5), (b"IEND", 0)]);
+        assert!(matches!(plain(&kept), Cow::Borrowed(_)));
+        let more = [
+            (b"IHDR", 13),
+            (b"iCCP", 9),
+            (b"PLTE", 6),
+            (b"zTXt", 1),
+            (b"iTXt", 0),
+            (b"IDAT", 5),
+            (b"IEND", 0),
+        ];
+        assert_eq!(plain(&chunks(&more)).as_ref(), kept);
     }
 
     #[test]

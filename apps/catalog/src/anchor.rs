@@ -23,6 +23,8 @@ const PARTS: [(usize, usize, [&str; 2]); 2] = [
 const GUIDE: usize = 12;
 /// The least share of the variance that the denoiser is told is left: what a few samples say of their own noise is not believed further.
 const LEAST: f32 = 0.6;
+/// Standard deviations of the still's noise that are believed of a single pixel.
+const SPECK: f32 = 3.0;
 /// Differences of albedo, normal and (relative) depth above which a pixel shows something else.
 const LIMITS: [f32; 3] = [0.02, 0.06, 0.004];
 /// The difference that many paths make to the still, pixel by pixel, and what the still shows there.
@@ -130,7 +132,12 @@ impl Anchor {
         let (fr, rr, ff) = (sum(&f, &r), sum(&r, &r), sum(&f, &f));
         (0..same.len())
             .map(|i| {
-                let b = same[i] * (fr[i] / rr[i].max(1e-20)).clamp(0.0, 1.0);
+                // A speck of the still that the frame does not have would leave a hole: no more than the noise around.
+                let sigma = (rr[i] / count[i].max(1.0)).sqrt();
+                let speck = luminance(&self.pixels[i][at..at + 3]).abs().max(1e-20);
+                let b = same[i]
+                    * (fr[i] / rr[i].max(1e-20)).clamp(0.0, 1.0)
+                    * (SPECK * sigma / speck).min(1.0);
                 let explained = (fr[i] * fr[i] / (rr[i] * ff[i]).max(1e-30)).clamp(0.0, 1.0);
                 let left = (1.0 - same[i] * explained + b * b * self.rest).clamp(LEAST, 1.0);
                 (b, left)
@@ -311,6 +318,18 @@ mod tests {
         let indirect = frame.layer("indirect").unwrap();
         let worst = indirect.iter().map(|p| (p[0] - 0.5).abs());
         assert!(worst.fold(0.0, f32::max) < 0.05, "{indirect:?}");
+    }
+
+    #[test]
+    fn a_speck_of_the_still_leaves_no_hole() {
+        let at = SIDE * SIDE / 2 + 5;
+        let shared = |i: usize| 1.0 + 0.3 * noise(i, 1);
+        let few = film(|i| shared(i) + if i == at { 1.5 } else { 0.0 }, 2.0);
+        let anchor = Anchor::new(&few, &film(|_| 1.0, 2.0), 0.1);
+        let mut frame = film(shared, 2.0);
+        anchor.steady(&mut frame);
+        let hole = frame.beauty().unwrap()[at][0];
+        assert!(hole > 0.4, "{hole}");
     }
 
     #[test]

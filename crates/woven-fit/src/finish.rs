@@ -168,8 +168,8 @@ pub(crate) fn finish(
         }
     }
     // Errors that the rows share change what the minimum is.
-    let known = sigmas(full, options.metric);
-    let settled = settle(&mut joint, known.as_deref(), &both, &settings);
+    let known = sigmas(full, options.metric).is_some();
+    let settled = settle(&mut joint, known, &both, &settings);
     let (mut whitening, mut offsets, mut points) = (Whitening::default(), Vec::new(), None);
     if let Some(s) = settled {
         (both, outcome) = (s.solution.x, s.solution.outcome);

@@ -1,7 +1,7 @@
 //! From a measurement to ranked models: what is asked, what comes back, and the way through all models.
 
-use crate::measurement::shared::{Kind, shared};
-use crate::measurement::{Detail, Measurement, Points, Source};
+use crate::measurement::shared::Kind;
+use crate::measurement::{Detail, Measurement, Points, Source, check};
 use crate::problem::{Metric, Spec};
 use crate::rank;
 use crate::reflection::reflected;
@@ -265,7 +265,7 @@ pub fn variants(model: &'static ModelInfo, measured_gap: bool) -> Vec<Spec> {
 pub fn fit(data: &Measurement, options: &Options, progress: Progress<'_>) -> Result<FitResult> {
     let models = models_named(options.models.as_deref())?;
     if let Source::Scan(scan) = &data.source {
-        shared(scan)?;
+        check(scan)?;
     }
     let coarse = data.points(true, Detail::Coarse, options.normal_only);
     let full = data.points(true, Detail::Full, options.normal_only);

@@ -5,6 +5,7 @@
 //! is compared, and the density with which a gap's delta appears in it.
 
 mod kernel;
+mod own;
 mod remarks;
 pub mod shared;
 
@@ -39,6 +40,8 @@ pub struct Point {
     pub f: f64,
     /// Its standard error, if known.
     pub sigma: Option<f64>,
+    /// Share of the standard error that is the value's own; the rest it has in common with the others.
+    pub own: f64,
     /// Projected solid angle of the kernel in sr, 0 if unknown.
     pub area: f64,
     /// Its part of the measured light, relative to the mean of all points: patches of a matrix count by their projected
@@ -164,7 +167,7 @@ impl Measurement {
             }
             "csv" => {
                 let scan = Scan::parse(text).with_context(place)?;
-                shared::shared(&scan).with_context(place)?;
+                check(&scan).with_context(place)?;
                 (Source::Scan(scan), stem, String::new())
             }
             _ => {
@@ -242,6 +245,15 @@ impl Measurement {
             Source::Scan(scan) => kernel::scan_points(scan, transmission, normal_only),
         }
     }
+}
+
+/// Whether the comments of a scan that a fit reads can be read.
+///
+/// # Errors
+/// A sentence with the line.
+pub fn check(scan: &Scan) -> Result<()> {
+    shared::shared(scan)?;
+    own::own(scan).map(|_| ())
 }
 
 /// How finely kernels are sampled.

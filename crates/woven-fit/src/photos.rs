@@ -136,6 +136,7 @@ impl Photo {
                 v,
                 f,
                 sigma: None,
+                own: 1.0,
                 area: 0.0,
                 share: 1.0,
                 incidence: 0,

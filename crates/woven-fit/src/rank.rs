@@ -48,7 +48,8 @@ pub fn score(fit: &mut ModelFit, points: &Points, metric: Metric, floor: f64) {
     for peaks in [true, false] {
         let (n, sum) = group(points, &squares, peaks);
         if n > 0.0 {
-            likelihood += n * (sum / n).max(f64::MIN_POSITIVE).ln();
+            let least = least_scatter(points, peaks, metric, floor);
+            likelihood += n * (sum / n).max(least).ln();
             groups += 1.0;
         }
     }
@@ -83,6 +84,24 @@ fn group(points: &Points, squares: &[f64], peaks: bool) -> (f64, f64) {
     rows.fold((0.0, 0.0), |(n, s), (_, e)| (n + 1.0, s + e))
 }
 
+/// The least scatter of a group that is believed. A few rows tell none by themselves: a model that meets a single peak exactly
+/// would gain without end. 2 % of their level is taken for them.
+fn least_scatter(points: &Points, peaks: bool, metric: Metric, floor: f64) -> f64 {
+    const FEW: usize = 6;
+    let rows: Vec<&Point> = points
+        .points
+        .iter()
+        .filter(|p| p.is_peak() == peaks)
+        .collect();
+    if rows.len() > FEW {
+        return f64::MIN_POSITIVE;
+    }
+    let value = |f: f64| metric.apply(f, floor).0;
+    let one = |p: &&Point| p.share * (value(1.02 * p.f) - value(p.f)).powi(2);
+    let sum: f64 = rows.iter().map(one).sum();
+    (sum / rows.len().max(1) as f64).max(f64::MIN_POSITIVE)
+}
+
 /// Sorts by misfit and gives places; neighbours that the data cannot tell apart share a place.
 ///
 /// Two models tie when their AICc differ by less than 2, or when the sign of the difference of their misfits is not
@@ -99,7 +118,8 @@ pub fn sort(fits: &mut [ModelFit], points: &Points, options: &Options) {
             let (n, sum) = group(points, r, peaks);
             sum / n.max(1.0)
         });
-        means.fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE)
+        let least = least_scatter(points, peaks, options.metric, floor);
+        means.fold(f64::INFINITY, f64::min).max(least)
     };
     let (peak, rest) = (scatter(true), scatter(false));
     let many = points.incidences.len() >= 5;

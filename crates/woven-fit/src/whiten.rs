@@ -6,8 +6,8 @@
 //! that of an axis) moves the estimate; what they cannot see (the scale) widens the intervals.
 
 use crate::linalg::dot;
-use crate::measurement::Points;
 use crate::measurement::shared::{Kind, shifted};
+use crate::measurement::{Point, Points};
 use crate::problem::{Evaluator, Joint};
 use crate::solve::{Residuals, Settings, Solution, solve};
 use nalgebra::{DMatrix, DVector};
@@ -136,21 +136,6 @@ pub(crate) fn columns(joint: &Joint<'_>, both: &[f64]) -> Option<Vec<f64>> {
     Some(sides.into_iter().flat_map(column).collect())
 }
 
-/// Of a row's standard error that also holds the shared errors, at least this share is taken for its own.
-const OWN: f64 = 0.05;
-
-/// Square roots of weights for the rows' own noise, from those for their whole standard errors.
-fn own_weights(base: &[f64], sigmas: &[f64], sides: &[Sides]) -> Vec<f64> {
-    let one = |(i, (w, s)): (usize, (&f64, &f64))| {
-        let shared: f64 = sides
-            .iter()
-            .map(|(up, down)| (0.5 * (up[i] - down[i])).powi(2))
-            .sum();
-        w * s / (s * s - shared).max((OWN * s).powi(2)).sqrt()
-    };
-    base.iter().zip(sigmas).enumerate().map(one).collect()
-}
-
 /// The end of a fit with shared errors.
 pub(crate) struct Settled {
     /// The rows as the axes really stood, as far as the data tell, bent so that the problem is linear in all shared errors.
@@ -165,14 +150,14 @@ pub(crate) struct Settled {
     pub(crate) found: Vec<f64>,
 }
 
-/// From the minimum without shared errors to that with them; none if there are none or nothing can be evaluated. `sigmas` are
-/// the rows' whole standard errors, where known.
+/// From the minimum without shared errors to that with them; none if there are none or nothing can be evaluated. With
+/// `weighted` the weights are those of the rows' whole standard errors, and become those of what is their own.
 ///
 /// G and the scatter depend on the answer, and an axis that is off moves a narrow lobe by more than its slope tells, so a
 /// few rounds settle all three.
 pub(crate) fn settle(
     joint: &mut Joint<'_>,
-    sigmas: Option<&[f64]>,
+    weighted: bool,
     start: &[f64],
     settings: &Settings,
 ) -> Option<Settled> {
@@ -181,10 +166,15 @@ pub(crate) fn settle(
     if full.shared.is_empty() || m <= n {
         return None;
     }
+    let own = |p: &Point| if weighted { p.own } else { 1.0 };
+    let weights = joint.weights.iter().zip(&full.points);
+    let weights: Vec<f64> = weights.map(|(w, p)| w / own(p)).collect();
     let mut r = vec![0.0; m];
     if !joint.evaluate(start, &mut r, None) {
         return None;
     }
+    let rows = r.iter_mut().zip(&full.points);
+    rows.for_each(|(r, p)| *r /= own(p));
     let dof = (m - n) as f64;
     let mut scatter = (dot(&r, &r) / dof).sqrt();
     let (mut x, mut z) = (start.to_vec(), vec![0.0; full.shared.len()]);
@@ -196,11 +186,7 @@ pub(crate) fn settle(
             points: &points,
             ..joint.eval
         };
-        let weights = match sigmas {
-            Some(sigmas) => own_weights(&joint.weights, sigmas, &changes(eval, &x)?),
-            None => joint.weights.clone(),
-        };
-        let mut inner = Joint::new(eval, weights, joint.metric, joint.floor);
+        let mut inner = Joint::new(eval, weights.clone(), joint.metric, joint.floor);
         let g = columns(&inner, &x)?;
         let whitening = Whitening::new(&g, m, scatter)?;
         let problem = &mut Whitened {
@@ -216,7 +202,6 @@ pub(crate) fn settle(
         let moved = moved.zip(&full.shared).filter(|(_, s)| s.kind.is_axis());
         let still = moved.fold(0.0, |most, (d, _)| f64::max(most, d)) < STILL;
         if round == 8 || (still && (scatter - before).abs() <= 1e-3 * before) {
-            let weights = inner.weights;
             return Some(Settled {
                 points,
                 weights,

@@ -145,6 +145,45 @@ fn axes_that_are_off_are_found_and_do_not_mislead() {
 }
 
 #[test]
+fn rows_count_by_what_is_their_own() {
+    // Total errors as a merge writes them: noise, and the slope times the axes' standard deviation.
+    let slope = {
+        let [up, down] = [0.1, -0.1].map(|d| scan(1, 1.0, 0.0, d, 0.0).samples);
+        move |i: usize| 0.5 * (up[i].f - down[i].f)
+    };
+    let make = |told: bool| {
+        let slope = &slope;
+        move |seed: u64| {
+            let z = |k| normal(seed ^ 0x777, k);
+            let mut scan = scan(seed, 1.0, 0.0, 0.1 * z(0), 0.0);
+            let mut shares = Vec::new();
+            for (i, s) in scan.samples.iter_mut().enumerate() {
+                // Three rows of four are twenty times as noisy.
+                let noise = if i % 4 == 0 { 1e-3 } else { 2e-2 };
+                s.f += (noise * noise - 1e-6_f64).max(0.0).sqrt() * normal(seed ^ 0x778, i as u64);
+                let total = f64::hypot(noise, slope(i));
+                s.sigma = Some(total);
+                shares.push((noise / total).to_string());
+            }
+            scan.comments = vec!["shared,light_theta_deg,0.1".into()];
+            if told {
+                let lines = shares.chunks(16).enumerate();
+                let line = |(n, c): (usize, &[String])| format!("own,{},{}", 16 * n, c.join(","));
+                scan.comments.extend(lines.map(line));
+            }
+            scan
+        }
+    };
+    let (told, untold) = (
+        coverage(&lobe(), &TRUTH, make(true)),
+        coverage(&lobe(), &TRUTH, make(false)),
+    );
+    println!("{told:?}\n{untold:?}");
+    assert!(told.iter().all(|(share, _)| *share >= LEAST), "{told:?}");
+    assert!(told[2].1 < 0.8 * untold[2].1, "{told:?} {untold:?}");
+}
+
+#[test]
 fn the_gap_knows_of_a_shared_scale() {
     let spec = Spec::transmission(model::find("ggx-mirrored").unwrap(), true, true);
     let make = |named: bool| {

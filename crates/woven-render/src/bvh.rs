@@ -11,6 +11,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use rayon::prelude::*;
 
 /// A child that is not there.
 pub const EMPTY: u32 = u32::MAX;
@@ -90,24 +91,32 @@ impl Bvh {
 
     /// Puts moved triangles (the same number as built with) into the tree and fits the boxes to them.
     pub fn refit(&mut self, corners: &[Corners]) {
-        for (packet, order) in self.packets.iter_mut().zip(self.order.chunks_exact(4)) {
-            for (lane, &i) in order.iter().enumerate() {
-                let [a, b, c] = if i == EMPTY {
-                    [Vec3::ZERO; 3]
-                } else {
-                    corners[i as usize]
-                };
-                for axis in 0..3 {
-                    packet.v0[axis][lane] = a[axis];
-                    packet.e1[axis][lane] = b[axis] - a[axis];
-                    packet.e2[axis][lane] = c[axis] - a[axis];
+        let leaves: Vec<Aabb> = self
+            .packets
+            .par_iter_mut()
+            .zip(self.order.par_chunks_exact(4))
+            .map(|(packet, order)| {
+                let mut all = Aabb::INVALID;
+                for (lane, &i) in order.iter().enumerate() {
+                    let mut triangle = [Vec3::ZERO; 3];
+                    if i != EMPTY {
+                        triangle = corners[i as usize];
+                        all = all.union(&bounds(&triangle));
+                    }
+                    let [a, b, c] = triangle;
+                    for axis in 0..3 {
+                        packet.v0[axis][lane] = a[axis];
+                        packet.e1[axis][lane] = b[axis] - a[axis];
+                        packet.e2[axis][lane] = c[axis] - a[axis];
+                    }
                 }
-            }
-        }
+                all
+            })
+            .collect();
         for n in (0..self.nodes.len()).rev() {
             for lane in 0..4 {
                 let child = self.nodes[n].child[lane];
-                let b = self.child_bounds(child, corners);
+                let b = self.child_bounds(child, &leaves);
                 for axis in 0..3 {
                     self.nodes[n].lo[axis][lane] = b.min[axis];
                     self.nodes[n].hi[axis][lane] = b.max[axis];
@@ -117,7 +126,7 @@ impl Bvh {
     }
 
     /// The box of a child: of its triangles, or of the four boxes of its node.
-    fn child_bounds(&self, child: u32, corners: &[Corners]) -> Aabb {
+    fn child_bounds(&self, child: u32, leaves: &[Aabb]) -> Aabb {
         if child == EMPTY {
             // A box that no ray meets, without infinities.
             return Aabb {
@@ -126,11 +135,7 @@ impl Bvh {
             };
         }
         if child & LEAF != 0 {
-            let first = (child & !LEAF) as usize * 4;
-            let places = self.order[first..first + 4].iter().filter(|&&i| i != EMPTY);
-            return places.fold(Aabb::INVALID, |b, &i| {
-                b.union(&bounds(&corners[i as usize]))
-            });
+            return leaves[(child & !LEAF) as usize];
         }
         let node = &self.nodes[child as usize];
         let side = |v: &[Vec4; 3], lane: usize| Vec3A::new(v[0][lane], v[1][lane], v[2][lane]);

@@ -10,6 +10,7 @@ mod sky;
 use anyhow::{Result, bail, ensure};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use crate::bvh::{Bvh, Corners, EMPTY, STACK};
 use crate::optics;
@@ -275,7 +276,7 @@ impl Table {
             owners,
             first,
         };
-        table.fill_shade();
+        table.fill_shade(None);
         table.fill_colors(scene);
         table.fill_gaps();
         sky::fill(&mut table, scene, light_layers);
@@ -329,34 +330,31 @@ impl Table {
         for (t, triangle) in old.indices.iter().enumerate() {
             self.corners[self.first[mesh] + t] = triangle.map(|i| positions[i as usize]);
         }
-        let gaps: Vec<_> = self.bvh.packets.iter().map(|p| p.gap).collect();
         self.bvh.refit(&self.corners);
-        self.bvh
-            .packets
-            .iter_mut()
-            .zip(gaps)
-            .for_each(|(p, gap)| p.gap = gap);
-        self.fill_shade();
+        self.fill_shade(Some(mesh));
         lights::moved(self);
         Ok(())
     }
 
-    fn fill_shade(&mut self) {
-        for (place, &i) in self.bvh.order.iter().enumerate() {
+    /// Fills the rows of one mesh, or all.
+    fn fill_shade(&mut self, only: Option<usize>) {
+        let (owners, meshes) = (&self.owners, &self.meshes);
+        let rows = self.shade.par_iter_mut().zip(&self.bvh.order);
+        rows.for_each(|(row, &i)| {
             if i == EMPTY {
-                continue;
+                return;
             }
-            let (m, t) = self.owners[i as usize];
-            let mesh = &self.meshes[m as usize];
-            let Shade { light, colors, .. } = self.shade[place];
-            self.shade[place] = Shade {
-                light,
-                colors,
-                mesh: m,
-                triangle: t,
-                ..shade_row(mesh, t as usize)
-            };
-        }
+            let (m, t) = owners[i as usize];
+            if only.is_none_or(|o| o == m as usize) {
+                *row = Shade {
+                    light: row.light,
+                    colors: row.colors,
+                    mesh: m,
+                    triangle: t,
+                    ..shade_row(&meshes[m as usize], t as usize)
+                };
+            }
+        });
     }
 
     fn fill_colors(&mut self, scene: &Scene) {

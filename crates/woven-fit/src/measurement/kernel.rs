@@ -1,5 +1,6 @@
 //! The instrument's kernels: over which directions each measured value is an average, for matrices and for scans.
 
+use super::own::own;
 use super::shared::shared;
 use super::{Detail, Node, Point, Points};
 use std::f64::consts::PI;
@@ -86,6 +87,7 @@ pub(super) fn klems_points(k: &Klems, block: &Block, detail: Detail, normal_only
                 v,
                 f: k.value(block, o, i),
                 sigma: None,
+                own: 1.0,
                 area,
                 share: area * incident.projected_solid_angle(),
                 incidence: index,
@@ -143,6 +145,7 @@ pub(super) fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) ->
     let mut out = Points::default();
     // Lines that cannot be read are told by whoever reads the file or fits it.
     (out.shared, _) = shared(scan).unwrap_or_default();
+    let (own_samples, own_direct) = own(scan).unwrap_or_default();
     let aperture = aperture(scan);
     let incidence = |out: &mut Points, l: Vec3<f64>| {
         // Directions that differ by less than a hundredth of a degree are one incidence.
@@ -157,7 +160,7 @@ pub(super) fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) ->
     };
     let steep = radians(STEEP_DEG).cos();
     let is_normal = |l: Vec3<f64>| l.z.abs() > radians(0.5).cos();
-    for s in &scan.samples {
+    for (row, s) in scan.samples.iter().enumerate() {
         let transmits = s.l.z * s.v.z < 0.0;
         if transmits != transmission || (normal_only && !is_normal(s.l)) {
             continue;
@@ -188,6 +191,7 @@ pub(super) fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) ->
             v: s.v,
             f: s.f,
             sigma: s.sigma,
+            own: own_samples.get(row).copied().unwrap_or(1.0),
             area,
             share: 1.0,
             incidence: index,
@@ -198,7 +202,7 @@ pub(super) fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) ->
         });
     }
     if transmission {
-        for d in &scan.direct {
+        for (row, d) in scan.direct.iter().enumerate() {
             if (normal_only && !is_normal(d.l)) || d.l.z.abs() < steep {
                 continue;
             }
@@ -214,6 +218,7 @@ pub(super) fn scan_points(scan: &Scan, transmission: bool, normal_only: bool) ->
                 v: -d.l,
                 f: d.transmittance,
                 sigma: d.sigma,
+                own: own_direct.get(row).copied().unwrap_or(1.0),
                 area: 1.0,
                 share: 1.0,
                 incidence: index,

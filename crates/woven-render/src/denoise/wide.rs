@@ -12,9 +12,9 @@ use super::{Guide, Plane, Settings, fall, planes};
 const LEVELS: u32 = 5;
 /// Levels whose steps stay within a block of pixels that share their noise: it does not fall there.
 const SHARED: u32 = 3;
-/// Differences are forgiven up to about this many standard deviations. Measured on the bench scene at 4 samples a pixel,
-/// FLIP against the converged picture; see `examples/frame.rs`.
-const FORGIVEN: f32 = 3.0;
+/// Differences are forgiven up to about this many standard deviations. FLIP (HDR) on the bench scene at 320 x 240 with 2 and
+/// 8 samples a pixel, against 160: 1 gives 0.091 and 0.062, 1.7 0.080 and 0.057, 3 0.085 and 0.065.
+const FORGIVEN: f32 = 1.8;
 /// The B3 spline.
 const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 

@@ -11,7 +11,7 @@ use woven_render::scene::{Camera, LAYER_SUN, Light, Material, Scene, Texture, Te
 /// A fine weave of black and white threads, forty repeats of 16 pixels, on a wall that a sun lights evenly.
 fn scene(shift: f32) -> Scene {
     let thread = |x: u32, y: u32| {
-        if (x / 4 + y / 4) % 2 == 0 {
+        if (x / 4 + y / 4).is_multiple_of(2) {
             [240, 230, 210, 255]
         } else {
             [20, 20, 30, 255]

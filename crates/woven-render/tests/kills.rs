@@ -117,7 +117,7 @@ fn killed_at_random_it_ends_with_the_same_bytes() {
         .ok()
         .and_then(|n| n.parse().ok())
         .unwrap_or(2);
-    let (frames, spp) = if kills > 2 { (24, 32) } else { (4, 8) };
+    let (frames, spp) = if kills > 2 { (24, 8) } else { (4, 8) };
     let dir = tempfile::tempdir().unwrap();
     stage(dir.path(), frames);
     let whole = dir.path().join("whole");

@@ -30,12 +30,14 @@ impl Random {
     }
 }
 
+/// Reads bytes; true when they were understood.
+type Read = Box<dyn Fn(&[u8]) -> bool>;
+
 /// Something that reads bytes nobody vouches for.
 pub(crate) struct Target {
     pub(crate) name: &'static str,
     seeds: Vec<Seed>,
-    /// Reads the bytes; true when they were understood.
-    read: Box<dyn Fn(&[u8]) -> bool>,
+    read: Read,
 }
 
 /// A whole file to start from.

@@ -26,7 +26,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<()> {
             form = Some(*bytes.get(at + 17).context("its header is cut off")?);
         } else if &kind == b"PLTE" {
             ensure!(
-                (3..=768).contains(&length) && length % 3 == 0,
+                (3..=768).contains(&length) && length.is_multiple_of(3),
                 "its palette has {length} bytes, not three for each of 1 to 256 colours"
             );
         } else if &kind == b"tRNS" {

@@ -109,8 +109,8 @@ pub(crate) fn drape() -> Vec<Row> {
         ..cloth()
     };
     let dc = |c: f64, cells: usize| cusick(&with(c), 0.3, cells, 0.0).coefficient;
-    let found = [14.0, 17.0, 22.0].map(|c| dc(c, 24));
-    let fine = dc(17.0, 36);
+    let found = [14.0, 17.0, 22.0].map(|c| dc(c, 32));
+    let fine = dc(17.0, 48);
     vec![
         Row::new(
             "V10",
@@ -122,7 +122,7 @@ pub(crate) fn drape() -> Vec<Row> {
         // Two points of the instrument.
         Row::new(
             "V10",
-            "  17 mm: 24 cells across against 36",
+            "  17 mm: 32 cells across against 48",
             fine,
             found[1],
             0.02 / fine,

@@ -30,7 +30,7 @@
 //! | [`transport`], [`serial`], [`recorded`] | carrying bytes: a port, a recording played back, a simulated rig ([`sim::MemoryTransport`]) |
 //! | [`controller`], [`detector`] | what to say to the arms and to the light meter, and what to believe of their answers |
 //! | [`scan`], [`log`], [`replay`] | the scan, its log that survives a cut of the power, and a look at it without the rig |
-//! | [`exposure`], [`merge`], [`klems`] | from counts to a measurement with standard errors |
+//! | [`exposure`], [`merge`], [`klems`] | from counts to a measurement with standard errors, and which of them all values share ([`merge::Shared`]) |
 //! | [`sim`] | the rig's twin, with everything that goes wrong |
 //!
 //! Long campaigns, none of them part of the suite:
@@ -44,6 +44,9 @@
 //! | 1000 stops, on a quiet machine | `OGM_STOPS=1000 cargo test --release -p ogm-driver --test stops -- --nocapture` |
 //! | what the driver adds to a point | `cargo run --release -p ogm-driver --example overhead` |
 //! | more rigs of known truth | `OGM_RIGS=300 cargo test --release -p ogm-driver --test calibration -- --nocapture` |
+//! | more rigs from cloth to fitted intervals | `OGM_FITS=40 cargo test -p woven-tests --test rig_to_fit -- --nocapture` |
+//!
+//! What came out stands in `docs/rig.md`.
 
 pub mod adaptive;
 pub mod axis;

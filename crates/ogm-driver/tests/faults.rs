@@ -1,7 +1,7 @@
 //! Random fault scripts on virtual time: every one ends in a sentence within the deadlines or in a complete scan; no point at an unverified pose,
 //! no move sent twice, and afterwards a healthy session completes the same log.
 //!
-//! `OGM_FAULT_SCRIPTS` sets the number of scripts (the suite runs 120); `OGM_SCRIPT=n` runs script n alone and prints its conversation.
+//! `OGM_FAULT_SCRIPTS` sets the number of scripts (the suite runs 500); `OGM_SCRIPT=n` runs script n alone and prints its conversation.
 
 mod common;
 
@@ -239,7 +239,7 @@ fn run_script(script: u64, folder: &Path, show: bool) -> (bool, String) {
 
 #[test]
 fn random_fault_scripts_end_in_a_sentence_and_are_recovered_from() {
-    let count = common::number("OGM_FAULT_SCRIPTS", 120);
+    let count = common::number("OGM_FAULT_SCRIPTS", 500);
     let folder = common::quick_folder();
     if let Some(script) = std::env::var("OGM_SCRIPT")
         .ok()

@@ -1,7 +1,7 @@
 //! Random rigs and random plans: whatever the plan asks, no move on the wire leaves the limits or enters the zone where the arms touch.
 //! The wire is read by a second account of both languages and of the geometry, so that an error in ours does not hide itself.
 //!
-//! `OGM_PLANS` sets the number of plans (the suite: 600).
+//! `OGM_PLANS` sets the number of plans (the suite: 3000).
 
 mod common;
 
@@ -163,7 +163,7 @@ fn no_byte_on_the_wire_leaves_the_limits_or_enters_the_zone() {
     let count: u64 = std::env::var("OGM_PLANS")
         .ok()
         .and_then(|s| s.parse().ok())
-        .unwrap_or(600);
+        .unwrap_or(3000);
     let first: u64 = std::env::var("OGM_FIRST_PLAN")
         .ok()
         .and_then(|s| s.parse().ok())

@@ -20,12 +20,63 @@ pub struct CurtainClip {
 }
 
 impl CurtainClip {
-    /// Writes the clip; the extension decides: `.glb`, `.pc2`, `.mdd` or `.usda`. The file appears whole or not at all.
+    /// Writes the clip; the extension decides: `.glb`, `.pc2`, `.mdd` or `.usda`. The file appears whole or not at all. A second curtain
+    /// goes into a file of its own, `NAME.second.EXTENSION`.
     ///
     /// # Errors
     /// When the extension is unknown, the clip does not fit the format, or writing fails.
     pub fn write(&self, path: &Path) -> Result<()> {
-        cache::write(self, path)
+        let (first, second) = self.layers();
+        if let Some(second) = second {
+            cache::write(&second, &second_path(path))?;
+        }
+        cache::write(&first, path)
+    }
+
+    /// The clip of the first curtain, and that of the second if there is one.
+    #[must_use]
+    pub fn layers(&self) -> (Self, Option<Self>) {
+        let (first, second) = self.mesh.split();
+        let n = first.positions.len();
+        let part = |mesh: Mesh, range: std::ops::Range<usize>| Self {
+            mesh,
+            frames: self
+                .frames
+                .iter()
+                .map(|f| Frame {
+                    positions: f.positions[range.clone()].to_vec(),
+                    normals: f.normals[range.clone()].to_vec(),
+                    velocities: f.velocities[range.clone()].to_vec(),
+                })
+                .collect(),
+            fps: self.fps,
+        };
+        let all = self.mesh.positions.len();
+        match second {
+            Some(second) => (part(first, 0..n), Some(part(second, n..all))),
+            None => (self.clone(), None),
+        }
+    }
+
+    /// This clip and another of the same length as one.
+    ///
+    /// # Errors
+    /// When they have not as many frames.
+    pub fn with(mut self, other: &Self) -> Result<Self> {
+        if self.frames.len() != other.frames.len() {
+            return Err(Error::Cache(format!(
+                "one clip has {} frames, the other {}; they do not belong together",
+                self.frames.len(),
+                other.frames.len()
+            )));
+        }
+        self.mesh = self.mesh.with(&other.mesh);
+        for (a, b) in self.frames.iter_mut().zip(&other.frames) {
+            a.positions.extend(&b.positions);
+            a.normals.extend(&b.normals);
+            a.velocities.extend(&b.velocities);
+        }
+        Ok(self)
     }
 
     /// Reads a clip that `write` made as `.glb`, or the positions of a `.pc2` (whose mesh has no faces).
@@ -35,6 +86,15 @@ impl CurtainClip {
     pub fn read(path: &Path) -> Result<Self> {
         cache::read(path)
     }
+}
+
+/// Where the second curtain of a clip at `path` is written.
+#[must_use]
+pub fn second_path(path: &Path) -> std::path::PathBuf {
+    let extension = path.extension().unwrap_or_default().to_owned();
+    let mut tail = std::ffi::OsString::from("second.");
+    tail.push(extension);
+    path.with_extension(tail)
 }
 
 /// Simulates a whole clip in memory. `progress(done, total)` is called after every frame and may stop the work.

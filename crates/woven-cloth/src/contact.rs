@@ -1,10 +1,14 @@
 //! What the cloth cannot enter: floor, wall, sill, and itself.
 
 mod cells;
+mod distance;
 mod folds;
+mod guard;
+mod net;
 mod obstacles;
+mod patches;
+mod tiles;
 
 pub(crate) use cells::sort_into_cells;
 pub use folds::SelfContact;
-pub(crate) use folds::{Pair, Stage};
 pub use obstacles::Obstacles;

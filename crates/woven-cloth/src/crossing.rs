@@ -42,7 +42,13 @@ pub fn crossings(positions: &[[f32; 3]], mesh: &Mesh) -> usize {
         let at = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
         cells.near(at, |t| {
             let t = triangles[t];
-            if !t.contains(&e[0]) && !t.contains(&e[1]) && pierces(a, b, t.map(p)) {
+            let corners = t.map(p);
+            // Most are told apart by their boxes.
+            let apart = (0..3).any(|c| {
+                let [u, v, w] = corners.map(|q| q[c]);
+                a[c].max(b[c]) < u.min(v).min(w) || a[c].min(b[c]) > u.max(v).max(w)
+            });
+            if !apart && !t.contains(&e[0]) && !t.contains(&e[1]) && pierces(a, b, corners) {
                 count += 1;
             }
         });

@@ -38,6 +38,7 @@ pub(crate) struct Draw {
     side: Side,
     layout: Pleats,
     height: f64,
+    depth: f64,
     columns: usize,
     /// The span of ticks that `from` and `to` belong to.
     span: Option<u64>,
@@ -52,6 +53,7 @@ impl Draw {
             side: spec.draw_to,
             layout: spec.layout(),
             height: spec.rail_height(),
+            depth: spec.rail_depth,
             columns: spec.columns,
             span: None,
             from: Vec::new(),
@@ -93,7 +95,7 @@ impl Draw {
         self.layout(time)
             .row(self.columns, 0.0)
             .into_iter()
-            .map(|[x, z]| [x + middle, self.height, z])
+            .map(|[x, z]| [x + middle, self.height, z + self.depth])
             .collect()
     }
 

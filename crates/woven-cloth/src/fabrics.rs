@@ -34,6 +34,10 @@ pub struct Mechanics {
     pub bending_length_warp_mm: Option<f64>,
     /// Bending length along the weft, mm; when given it replaces `bending_weft`.
     pub bending_length_weft_mm: Option<f64>,
+    /// Friction of bending, N (moment per width): half of Kawabata's 2HB; 2HB of 1 gf·cm/cm is 9.807e-3. 0 leaves it out.
+    pub bending_hysteresis: f64,
+    /// Friction of shear, N/m: half of Kawabata's 2HG; 2HG of 1 gf/cm is 0.9807. 0 leaves it out.
+    pub shear_hysteresis: f64,
     /// Retardation time of the threads' stretch, s: stress = Y (strain + time × strain rate).
     pub stretch_damping: f64,
     /// Retardation time of shear and of bending, s. Acts on the rate of deformation, so it does not slow a fall.
@@ -112,6 +116,8 @@ impl Fabric {
             bending_weft: bending(self.bending_length[1]),
             bending_length_warp_mm: None,
             bending_length_weft_mm: None,
+            bending_hysteresis: 0.0,
+            shear_hysteresis: 0.0,
             stretch_damping: 2e-3,
             bending_damping: 1e-2,
             thickness: self.thickness_mm * 1e-3,
@@ -218,6 +224,14 @@ impl Mechanics {
                 check(field, mm, 0.0, 200.0, "mm")?;
             }
         }
+        check(
+            "bending_hysteresis",
+            self.bending_hysteresis,
+            0.0,
+            0.01,
+            "N",
+        )?;
+        check("shear_hysteresis", self.shear_hysteresis, 0.0, 50.0, "N/m")?;
         check("stretch_damping", self.stretch_damping, 0.0, 0.1, "s")?;
         check("bending_damping", self.bending_damping, 0.0, 0.1, "s")?;
         check("thickness", self.thickness, 1e-5, 0.02, "m")?;

@@ -6,8 +6,10 @@
 //! * Bending, per three vertices of a thread: E = B A/2 |second difference / h²|² (constant matrix, exact for small strain);
 //!   per cell the twist: E = B_t A |x_ij mixed difference / (hx hy)|², B_t = sqrt(B_warp B_weft).
 
+mod friction;
 mod slab;
 
+pub(crate) use friction::{Friction, RISE};
 pub(crate) use slab::{Slab, Terms};
 
 use crate::sheet::{Field, Sheet, half_at_ends};

@@ -1,8 +1,12 @@
-//! A textile laboratory for virtual cloth: the cantilever of Peirce (ASTM D1388).
+//! A textile laboratory for virtual cloth: the cantilever of Peirce (ASTM D1388) and the drape meter of Cusick.
 //!
 //! A strip clamped level bends under its weight; Gamma = w L³ / B decides its shape. At Gamma = 8.0042 the chord to the tip hangs at
 //! 41.5°, and the bending length is c = (B/w)^(1/3) = 0.49991 L (from the exact heavy elastica, which differs from Peirce's own
 //! formula by 5.8 % in B).
+
+mod drape;
+
+pub use drape::{Drape, TABLE, cusick};
 
 use crate::fabrics::{GRAVITY, Mechanics};
 use crate::sheet::Sheet;

@@ -34,7 +34,7 @@ mod weave;
 mod wind;
 mod work;
 
-pub use clip::{CurtainClip, simulate, simulate_to};
+pub use clip::{CurtainClip, second_path, simulate, simulate_to};
 pub use contact::{Obstacles, SelfContact};
 pub use crossing::crossings;
 pub use draw::{DrawKey, Side};
@@ -45,7 +45,7 @@ pub use rail::{Heading, Pleats};
 pub use reference::{Reference, explicit_step};
 pub use sheet::{Energy, Sheet};
 pub use simulation::{Frame, Report, Simulation, TICKS};
-pub use spec::CurtainSpec;
+pub use spec::{CurtainSpec, SecondLayer};
 pub use step::{Stepper, stable_step};
 pub use weave::weave_strain;
 pub use wind::{AIR_DENSITY, Opening, Wind, WindSpec, uniform_wind_forces, von_karman};

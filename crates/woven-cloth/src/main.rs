@@ -1,5 +1,7 @@
 //! `woven-cloth`: simulates a curtain into a cache that Blender and woven-render open.
 
+mod commands;
+
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 use std::io::IsTerminal;
@@ -8,7 +10,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use woven_cloth::lab::{Thread, peirce};
 use woven_cloth::{CurtainClip, CurtainSpec, FABRICS, Simulation, bending_length};
 
 #[derive(Parser)]
@@ -64,8 +65,11 @@ enum Command {
         /// Height in pixels
         #[arg(long, default_value_t = 480)]
         height: usize,
+        /// The cache of a second curtain, to be shown with it
+        #[arg(long)]
+        with: Option<PathBuf>,
     },
-    /// The virtual cantilever test (Peirce, ASTM D1388) of a fabric, beside the fabric's own bending length
+    /// The virtual cantilever (Peirce, ASTM D1388) and drape meter (Cusick) of a fabric, beside the fabric's own numbers
     #[command(
         name = "test-fabric",
         after_help = "Examples:\n  woven-cloth test-fabric voile\n  woven-cloth test-fabric curtain.toml"
@@ -76,12 +80,18 @@ enum Command {
         /// Segments of the strip
         #[arg(long, default_value_t = 48)]
         segments: usize,
+        /// Cells across the round piece of the drape meter
+        #[arg(long, default_value_t = 48)]
+        cells: usize,
     },
     /// Look through a cache for places where the cloth passes through itself, and for its largest strain
     #[command(after_help = "Example:\n  woven-cloth check curtain.glb")]
     Check {
         /// A cache that `simulate` wrote as .glb
         cache: PathBuf,
+        /// The cache of a second curtain, to be looked at with it
+        #[arg(long)]
+        with: Option<PathBuf>,
     },
     /// List the built-in fabrics
     #[command(after_help = "Example:\n  woven-cloth fabrics")]
@@ -128,67 +138,21 @@ fn run(cli: Cli) -> anyhow::Result<()> {
             output,
             count,
             height,
-        } => {
-            let clip = CurtainClip::read(&cache)?;
-            anyhow::ensure!(
-                !clip.mesh.indices.is_empty(),
-                "{} has no faces to draw; give a .glb",
-                cache.display()
-            );
-            anyhow::ensure!(
-                (32..=4096).contains(&height),
-                "--height {height} is outside 32 to 4096 pixels"
-            );
-            let p = woven_cloth::preview::strip(&clip, count, height);
-            let picture = image::RgbImage::from_raw(p.width as u32, p.height as u32, p.rgb)
-                .context("the strip has no size")?;
-            let folder = output
-                .parent()
-                .filter(|f| !f.as_os_str().is_empty())
-                .unwrap_or(std::path::Path::new("."));
-            let mut file = tempfile::NamedTempFile::new_in(folder)
-                .with_context(|| format!("cannot write into {}", folder.display()))?;
-            picture.write_to(
-                &mut std::io::BufWriter::new(file.as_file_mut()),
-                image::ImageFormat::Png,
-            )?;
-            file.persist(&output)
-                .with_context(|| format!("cannot write {}", output.display()))?;
-            Ok(())
+            with,
+        } => commands::preview(
+            &commands::read(&cache, with.as_deref())?,
+            &output,
+            count,
+            height,
+        ),
+        Command::TestFabric {
+            fabric,
+            segments,
+            cells,
+        } => commands::test_fabric(&fabric, segments, cells),
+        Command::Check { cache, with } => {
+            commands::check(&commands::read(&cache, with.as_deref())?, &cache)
         }
-        Command::TestFabric { fabric, segments } => {
-            anyhow::ensure!(
-                (8..=256).contains(&segments),
-                "--segments {segments} is outside 8 to 256"
-            );
-            let path = std::path::Path::new(&fabric);
-            let mechanics = if path.extension().is_some() {
-                CurtainSpec::read(path)?.mechanics()?
-            } else {
-                woven_cloth::fabric(&fabric)?.mechanics()
-            };
-            println!("{fabric}: {:.0} g/m2", mechanics.areal_density * 1e3);
-            for (thread, name, b) in [
-                (Thread::Warp, "warp", mechanics.bending()[0]),
-                (Thread::Weft, "weft", mechanics.bending()[1]),
-            ] {
-                anyhow::ensure!(
-                    b > 0.0,
-                    "the bending stiffness along the {name} is 0, so the strip hangs straight down; nothing to measure"
-                );
-                let (own, found) = (
-                    bending_length(b, mechanics.areal_density) * 1e3,
-                    peirce(&mechanics, thread, segments) * 1e3,
-                );
-                println!(
-                    "  {name}: B {:.2} uN m, bending length {own:.2} mm; cantilever of {segments} segments finds {found:.2} mm ({:+.2} %)",
-                    b * 1e6,
-                    (found / own - 1.0) * 100.0
-                );
-            }
-            Ok(())
-        }
-        Command::Check { cache } => check(&cache),
         Command::Fabrics => {
             println!(
                 "{:<10} {:>6} {:>10} {:>10} {:>8} {:>8} {:>8}  about",
@@ -211,36 +175,6 @@ fn run(cli: Cli) -> anyhow::Result<()> {
             Ok(())
         }
     }
-}
-
-fn check(cache: &std::path::Path) -> anyhow::Result<()> {
-    let clip = CurtainClip::read(cache)?;
-    anyhow::ensure!(
-        !clip.mesh.indices.is_empty(),
-        "{} has no faces to look at; give a .glb",
-        cache.display()
-    );
-    let (mut sum, mut frames, mut worst, mut strain) = (0, 0, (0, 0), 0.0f32);
-    for (k, frame) in clip.frames.iter().enumerate() {
-        let found = woven_cloth::crossings(&frame.positions, &clip.mesh);
-        sum += found;
-        frames += usize::from(found > 0);
-        worst = worst.max((found, k));
-        for [warp, weft, _] in woven_cloth::weave_strain(&clip.mesh, &frame.positions) {
-            strain = strain.max(warp.abs()).max(weft.abs());
-        }
-    }
-    println!(
-        "{}: at rest {} crossings; in {} of {} frames {sum} (an edge through a triangle), most in frame {}: {}; largest strain at a vertex {:.2} %",
-        cache.display(),
-        woven_cloth::crossings(&clip.mesh.positions, &clip.mesh),
-        frames,
-        clip.frames.len(),
-        worst.1,
-        worst.0,
-        strain * 100.0
-    );
-    Ok(())
 }
 
 fn simulate_rest(spec: &CurtainSpec, output: &std::path::Path, json: bool) -> anyhow::Result<()> {

@@ -17,6 +17,8 @@ pub struct Mesh {
     pub fabric_size: [f32; 2],
     /// Columns and rows of vertices.
     pub grid: [usize; 2],
+    /// Columns and rows, and width and height (m), of a second curtain whose vertices follow the first's.
+    pub second: Option<([usize; 2], [f32; 2])>,
 }
 
 impl Mesh {
@@ -51,7 +53,49 @@ impl Mesh {
                 (sheet.hy * (ny - 1) as f64) as f32,
             ],
             grid: [nx, ny],
+            second: None,
         }
+    }
+
+    /// The mesh of two curtains: the vertices of `other` follow.
+    #[must_use]
+    pub fn with(mut self, other: &Self) -> Self {
+        let first = self.positions.len() as u32;
+        self.positions.extend(&other.positions);
+        self.normals.extend(&other.normals);
+        self.uvs.extend(&other.uvs);
+        self.indices.extend(other.indices.iter().map(|k| k + first));
+        self.second = Some((other.grid, other.fabric_size));
+        self
+    }
+
+    /// The two curtains of a mesh that `with` made, with the number of the first's vertices; the mesh itself and none otherwise.
+    #[must_use]
+    pub fn split(&self) -> (Self, Option<Self>) {
+        let n = self.grid[0] * self.grid[1];
+        let Some((grid, fabric_size)) = self.second else {
+            return (self.clone(), None);
+        };
+        let at = self.indices.partition_point(|&k| (k as usize) < n);
+        let part = |from: usize, to: usize, indices: Vec<u32>| Self {
+            positions: self.positions[from..to].to_vec(),
+            normals: self.normals[from..to].to_vec(),
+            uvs: self.uvs[from..to].to_vec(),
+            indices,
+            ..Self::default()
+        };
+        let first = Self {
+            fabric_size: self.fabric_size,
+            grid: self.grid,
+            ..part(0, n, self.indices[..at].to_vec())
+        };
+        let later = self.indices[at..].iter().map(|k| k - n as u32).collect();
+        let second = Self {
+            fabric_size,
+            grid,
+            ..part(n, self.positions.len(), later)
+        };
+        (first, Some(second))
     }
 }
 

@@ -16,6 +16,8 @@ pub enum Heading {
     Rings,
     /// Eyelets: the rod holds the heading in every pleat's two crossings.
     Eyelets,
+    /// A pocket on a rod: the cloth is pushed together into small uneven folds.
+    RodPocket,
 }
 
 /// A wave over the rail from -width/2 to +width/2: z(x) with a phase that may be irregular and pleats that may be sharp.
@@ -167,7 +169,11 @@ impl Pleats {
             width: self.width,
             pleats: self.pleats,
             sharpness,
-            irregular: self.irregularity * smooth(depth),
+            // On a rod the folds are uneven from the top on.
+            irregular: match self.heading {
+                Heading::RodPocket => self.irregularity * (0.5 + 0.5 * smooth(depth)),
+                _ => self.irregularity * smooth(depth),
+            },
             seed: self.seed,
         };
         let mut points = wave.fit(h, n);
@@ -185,7 +191,7 @@ impl Pleats {
         let at = |pleat: f64| ((pleat * per_pleat).round() as usize).min(columns - 1);
         let count = self.pleats.round().max(1.0) as usize;
         let mut held: Vec<usize> = match self.heading {
-            Heading::Wave | Heading::Pinch => (0..columns).collect(),
+            Heading::Wave | Heading::Pinch | Heading::RodPocket => (0..columns).collect(),
             Heading::Rings => (0..count)
                 .map(|p| at(p as f64 + 0.25))
                 .chain([0, columns - 1])
@@ -204,7 +210,7 @@ mod tests {
 
     #[test]
     fn pleats_are_isometric_for_every_fullness_and_heading() {
-        for heading in [Heading::Wave, Heading::Pinch] {
+        for heading in [Heading::Wave, Heading::Pinch, Heading::RodPocket] {
             for fullness in [1.0, 1.5, 2.0, 2.5, 3.0] {
                 let pleats = Pleats {
                     width: 1.4,

@@ -1,5 +1,7 @@
 //! The description of a curtain: what a person writes in `CURTAIN.toml`, its defaults and its limits.
 
+mod limits;
+
 use crate::contact::Obstacles;
 use crate::draw::{DrawKey, Side};
 use crate::error::{Error, Result};
@@ -25,11 +27,13 @@ pub struct CurtainSpec {
     pub height: f64,
     /// Height of the rail above the floor, m; by default 2 cm more than the fabric.
     pub rail_height: Option<f64>,
+    /// Place of the rail along z, m.
+    pub rail_depth: f64,
     /// Width of the flat fabric over the width of the rail.
     pub fullness: f64,
     /// Number of pleats.
     pub pleats: u32,
-    /// How it hangs: `wave`, `pinch`, `rings` or `eyelets`.
+    /// How it hangs: `wave`, `pinch`, `rings`, `eyelets` or `rod-pocket`.
     pub heading: Heading,
     /// How uneven the folds become towards the hem, 0 to 1.
     pub irregularity: f64,
@@ -70,6 +74,9 @@ pub struct CurtainSpec {
     pub substeps: Option<u32>,
     /// Seed of the wind and of the unevenness.
     pub seed: u64,
+    /// A second curtain on a rail of its own, such as a lace behind a drape; the two touch each other as folds do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second: Option<SecondLayer>,
 }
 
 impl Default for CurtainSpec {
@@ -78,6 +85,7 @@ impl Default for CurtainSpec {
             width: 1.4,
             height: 2.2,
             rail_height: None,
+            rail_depth: 0.0,
             fullness: 2.0,
             pleats: 12,
             heading: Heading::Wave,
@@ -100,6 +108,45 @@ impl Default for CurtainSpec {
             settle: 4.0,
             substeps: None,
             seed: 1,
+            second: None,
+        }
+    }
+}
+
+/// What a second curtain has of its own; all else is as with the first, its fabric included when none is named.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SecondLayer {
+    /// Name of a built-in fabric.
+    pub fabric: Option<String>,
+    /// Place of its rail along z, m.
+    pub rail_depth: f64,
+    /// Height of the fabric, m; none means the first curtain's.
+    pub height: Option<f64>,
+    /// Width of the flat fabric over the width of the rail.
+    pub fullness: f64,
+    /// Number of pleats.
+    pub pleats: u32,
+    /// How it hangs.
+    pub heading: Heading,
+    /// Weight of the hem, kg per metre of fabric width.
+    pub hem: f64,
+    /// Opening and closing of this curtain alone.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub draw: Vec<DrawKey>,
+}
+
+impl Default for SecondLayer {
+    fn default() -> Self {
+        Self {
+            fabric: None,
+            rail_depth: -0.12,
+            height: None,
+            fullness: 2.0,
+            pleats: 12,
+            heading: Heading::Wave,
+            hem: 0.02,
+            draw: Vec::new(),
         }
     }
 }
@@ -141,6 +188,26 @@ impl CurtainSpec {
         toml::from_str(text).map_err(|e| Error::Toml(e.to_string().trim_end().to_owned()))
     }
 
+    /// The second curtain's description, if there is one.
+    #[must_use]
+    pub fn second(&self) -> Option<Self> {
+        let own = self.second.clone()?;
+        Some(Self {
+            height: own.height.unwrap_or(self.height),
+            rail_height: Some(self.rail_height()),
+            rail_depth: own.rail_depth,
+            fullness: own.fullness,
+            pleats: own.pleats,
+            heading: own.heading,
+            hem: own.hem,
+            fabric: own.fabric.or_else(|| self.fabric.clone()),
+            draw: own.draw,
+            seed: self.seed.wrapping_add(1),
+            second: None,
+            ..self.clone()
+        })
+    }
+
     /// The mechanics in force: the named fabric's or those given.
     ///
     /// # Errors
@@ -176,129 +243,6 @@ impl CurtainSpec {
             seed: self.seed,
         }
     }
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// Names the field, the value and the limits.
-    pub fn validate(&self) -> Result<()> {
-        let range = |field: &str, value: f64, least: f64, most: f64, unit: &str| {
-            if value.is_finite() && (least..=most).contains(&value) {
-                return Ok(());
-            }
-            let unit = if unit.is_empty() {
-                String::new()
-            } else {
-                format!(" {unit}")
-            };
-            Err(Error::spec(
-                field,
-                format!("{value}{unit} is outside {least} to {most}{unit}"),
-            ))
-        };
-        range("width", self.width, 0.05, 20.0, "m")?;
-        range("height", self.height, 0.05, 20.0, "m")?;
-        range("fullness", self.fullness, 1.0, 4.0, "")?;
-        range("rail_height", self.rail_height(), 0.05, 30.0, "m")?;
-        range("pleats", f64::from(self.pleats), 1.0, 200.0, "")?;
-        range("irregularity", self.irregularity, 0.0, 1.0, "")?;
-        range("columns", self.columns as f64, 3.0, 2049.0, "")?;
-        range("rows", self.rows as f64, 3.0, 2049.0, "")?;
-        range("hem", self.hem, 0.0, 2.0, "kg/m")?;
-        range("friction", self.friction, 0.0, 2.0, "")?;
-        range("fps", self.fps, 1.0, 600.0, "1/s")?;
-        range("frames", self.frames as f64, 1.0, 1e6, "")?;
-        range("warm_up", self.warm_up, 0.0, 600.0, "s")?;
-        range("settle", self.settle, 0.0, 600.0, "s")?;
-        if let Some(n) = self.substeps {
-            range("substeps", f64::from(n), 1.0, 100.0, "")?;
-        }
-        for (k, key) in self.draw.iter().enumerate() {
-            range("draw.time", key.time, 0.0, 1e5, "s")?;
-            range("draw.share", key.share, 0.1, 1.0, "")?;
-            if k > 0 && key.time <= self.draw[k - 1].time {
-                return Err(Error::spec(
-                    "draw.time",
-                    format!("{} s does not come after the key before", key.time),
-                ));
-            }
-        }
-        if self.fullness > 1.0 {
-            let per_pleat = (self.columns - 1) as f64 / f64::from(self.pleats);
-            if per_pleat < 6.0 {
-                return Err(Error::spec(
-                    "columns",
-                    format!(
-                        "{} columns give {per_pleat:.1} to a pleat; at least 6 are needed, so ask for {} or fewer pleats",
-                        self.columns,
-                        self.pleats * 6 + 1
-                    ),
-                ));
-            }
-        }
-        self.mechanics()?.validate()?;
-        let w = &self.wind;
-        range("wind.speed", w.speed, 0.0, 20.0, "m/s")?;
-        range("wind.gust", w.gust, 0.0, 1.0, "")?;
-        range("wind.gust_length", w.gust_length, 0.05, 500.0, "m")?;
-        range("wind.turbulence", w.turbulence, 0.0, 1.0, "")?;
-        range("wind.eddy_length", w.eddy_length, 0.05, 10.0, "m")?;
-        range("wind.ramp", w.ramp, 0.0, 60.0, "s")?;
-        range("wind.blocking", w.blocking, 0.0, 1.0, "")?;
-        range("wind.tangential", w.tangential, 0.0, 1.0, "")?;
-        let length = w.direction.iter().map(|c| c * c).sum::<f64>().sqrt();
-        if !(length.is_finite() && length > 1e-6) {
-            return Err(Error::spec(
-                "wind.direction",
-                "the direction has no length; write for example [0.0, 0.0, 1.0]",
-            ));
-        }
-        for (k, s) in w.samples.iter().enumerate() {
-            range("wind.samples", s[1], -20.0, 20.0, "m/s")?;
-            if !s[0].is_finite() || (k > 0 && s[0] <= w.samples[k - 1][0]) {
-                return Err(Error::spec(
-                    "wind.samples",
-                    format!("the time {} s does not come after the one before", s[0]),
-                ));
-            }
-        }
-        if let Some(o) = w.opening {
-            for (field, [lo, hi]) in [("wind.opening.x", o.x), ("wind.opening.y", o.y)] {
-                if !(lo.is_finite() && hi.is_finite() && lo < hi) {
-                    return Err(Error::spec(
-                        field,
-                        format!(
-                            "[{lo}, {hi}] is no interval; the first number must be the smaller"
-                        ),
-                    ));
-                }
-            }
-            range("wind.opening.z", o.z, -20.0, 20.0, "m")?;
-        }
-        let o = &self.obstacles;
-        range("obstacles.friction", o.friction, 0.0, 2.0, "")?;
-        for (field, value) in [("obstacles.floor", o.floor), ("obstacles.wall", o.wall)] {
-            if let Some(v) = value {
-                range(field, v, -20.0, 20.0, "m")?;
-            }
-        }
-        if let Some([left, right, bottom, top]) = self.window {
-            for v in [left, right, bottom, top] {
-                range("window", v, -20.0, 20.0, "m")?;
-            }
-            if left >= right || bottom >= top {
-                return Err(Error::spec(
-                    "window",
-                    "[left, right, bottom, top] is no rectangle",
-                ));
-            }
-        }
-        if let Some([height, z]) = o.sill {
-            range("obstacles.sill", height, -20.0, 20.0, "m")?;
-            range("obstacles.sill", z, -20.0, 20.0, "m")?;
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]
@@ -330,6 +274,7 @@ mod tests {
             ("pleats = 60", "columns"),
             ("fps = -3.0", "fps"),
             ("colour = \"red\"", "colour"),
+            ("[second]\nfullness = 50.0", "second.fullness"),
         ] {
             let message = text.parse::<CurtainSpec>().unwrap_err().to_string();
             assert!(

@@ -6,7 +6,7 @@
 //!    implicit formula with a frequency ω² / (1 - h'²ω²): stable while h'ω < 1, dissipative at high and neutral at low frequencies;
 //! 3. contact of the cloth with itself, as a cushion;
 //! 4. all weft threads, then all warp threads, each by one exact tridiagonal solve (`line`);
-//! 5. contact of the cloth with itself, what is left to part; obstacles; v = (x - base)/h'.
+//! 5. obstacles; the guard, which lets nothing have passed through anything; v = (x - base)/h'.
 //!
 //! The first step after a start is backward Euler (h' = dt, base = x). Damping acts on the rate of deformation only: forces are
 //! taken at x̃ + tau ṽ.
@@ -17,15 +17,15 @@
 mod columns;
 mod rows;
 
-use crate::contact::{Obstacles, SelfContact, Stage};
-use crate::force::Shape;
+use crate::contact::{Obstacles, SelfContact};
+use crate::force::{Friction, RISE, Shape};
 use crate::line::{Block, LANES, Lane};
 use crate::sheet::{Field, Sheet};
 use crate::work::{over_bands, widest, worth_threads};
 use rayon::prelude::*;
 
 /// How far a step may go: the largest h'²ω² of shear, bending and tension waves.
-const STABLE: f64 = 0.6;
+const STABLE: f64 = 0.75;
 
 /// The state of the production solver beside the sheet itself.
 #[derive(Clone, Debug)]
@@ -33,6 +33,8 @@ pub struct Stepper {
     dt: f64,
     gravity: f64,
     shape: Shape,
+    /// Friction between yarns, for a fabric that has it.
+    pub(crate) friction: Option<Friction>,
     /// Retardation times of shear and of bending, s.
     tau: [f64; 2],
     /// Positions and velocities one step back.
@@ -54,6 +56,8 @@ pub struct Stepper {
     pub(crate) pins: Vec<usize>,
     /// Where the pinned vertices are after the next step, m; they stay where they are when this is empty.
     pub(crate) pin_places: Vec<[f64; 3]>,
+    /// h' of the present step, s.
+    hp: f64,
     /// The place that a step works on.
     q: Field,
     /// The warp threads, eight at a time; their lambda is the force of the step before (times h'²), which a step starts from.
@@ -67,7 +71,11 @@ pub struct Stepper {
 pub fn stable_step(sheet: &Sheet, gravity: f64) -> f64 {
     let height = sheet.hy * (sheet.ny - 1) as f64;
     let tension = 4.0 * 3.0 * gravity * height / sheet.hx.min(sheet.hy).powi(2);
-    let omega2 = Shape::shear_omega2(sheet) + Shape::bending_omega2(sheet) + tension;
+    let more = |limit: f64| if limit > 0.0 { 1.0 + RISE } else { 1.0 };
+    let m = &sheet.mechanics;
+    let omega2 = more(m.shear_hysteresis) * Shape::shear_omega2(sheet)
+        + more(m.bending_hysteresis) * Shape::bending_omega2(sheet)
+        + tension;
     1.5 * (STABLE / omega2).sqrt()
 }
 
@@ -87,6 +95,7 @@ impl Stepper {
             dt,
             gravity,
             shape: Shape::new(sheet),
+            friction: Friction::new(sheet),
             tau: [
                 tau.min(limit(Shape::shear_omega2(sheet))),
                 tau.min(limit(Shape::bending_omega2(sheet))),
@@ -101,6 +110,7 @@ impl Stepper {
             self_contact: None,
             pins: (0..n).filter(|&k| sheet.inv_mass[k] == 0.0).collect(),
             pin_places: Vec::new(),
+            hp: dt,
             q: zeros(n),
             warp: vec![Block::new(sheet.ny); sheet.nx.div_ceil(LANES)],
             weft_w: vec![vec![[0.0; LANES]; sheet.nx]; sheet.ny.div_ceil(LANES)],
@@ -158,59 +168,95 @@ impl Stepper {
 
     /// One step.
     pub fn step(&mut self, sheet: &mut Sheet) {
-        let hp = if self.history {
+        let mut contact = self.self_contact.take();
+        self.predict(sheet, contact.is_none());
+        if let Some(contact) = &mut contact {
+            contact.cushion(&sheet.inv_mass, &sheet.x, &mut self.q, self.hp);
+            self.weft(sheet);
+        }
+        self.hold(sheet);
+        if let Some(contact) = &mut contact {
+            let (masses, before) = (&sheet.inv_mass, &sheet.x);
+            contact.keep_apart(masses, before, &mut self.q, self.hp, worth_threads(sheet));
+        }
+        self.finish(sheet);
+        self.self_contact = contact;
+    }
+
+    /// h' of the step that `predict` began, s.
+    pub(crate) fn effective_step(&self) -> f64 {
+        self.hp
+    }
+
+    /// The place that the step has found so far.
+    pub(crate) fn place(&mut self) -> &mut Field {
+        &mut self.q
+    }
+
+    /// The first part of a step: prediction and forces, and the weft too when nothing comes between.
+    pub(crate) fn predict(&mut self, sheet: &Sheet, weft_too: bool) {
+        self.hp = if self.history {
             self.dt * 2.0 / 3.0
         } else {
             self.begin(sheet);
             self.dt
         };
-        let nx = sheet.nx;
-        let parallel = worth_threads(sheet);
-        let damping = sheet.mechanics.stretch_damping / hp;
-        let mut contact = self.self_contact.take();
+        if let Some(friction) = &mut self.friction {
+            let third = if self.history { 1.0 / 3.0 } else { 0.0 };
+            friction.update(sheet, [&self.x_old, &self.v_old], third, self.hp);
+        }
+        self.by_rows(sheet, true, weft_too);
+    }
+
+    /// The weft's threads, when `predict` has left them out.
+    pub(crate) fn weft(&mut self, sheet: &Sheet) {
+        self.by_rows(sheet, false, true);
+    }
+
+    fn by_rows(&mut self, sheet: &Sheet, forces: bool, weft: bool) {
         let mut q = std::mem::take(&mut self.q);
-        let mut warp = std::mem::take(&mut self.warp);
-        {
-            let job = rows::Rows {
-                stepper: self,
-                sheet,
-                warp: &warp,
-                hp,
-                damping,
-            };
-            let weft_too = contact.is_none();
-            over_bands(&mut q, rows::BAND * nx, parallel, |band, mut q| {
+        let warp = std::mem::take(&mut self.warp);
+        let job = rows::Rows {
+            stepper: self,
+            sheet,
+            warp: &warp,
+            hp: self.hp,
+            damping: sheet.mechanics.stretch_damping / self.hp,
+        };
+        over_bands(
+            &mut q,
+            rows::BAND * sheet.nx,
+            worth_threads(sheet),
+            |band, mut q| {
                 rows::with_scratch(|s| {
                     widest(
                         #[inline(always)]
                         || {
-                            job.forces(band, &mut q, s);
-                            if weft_too {
+                            if forces {
+                                job.forces(band, &mut q, s);
+                            }
+                            if weft {
                                 job.weft(band, &mut q, s);
                             }
                         },
                     );
                 });
-            });
-            if let Some(contact) = &mut contact {
-                // Before the threads are solved: this part never leaves a thread stretched.
-                contact.resolve(sheet, &mut q, hp, Stage::Cushion);
-                over_bands(&mut q, rows::BAND * nx, parallel, |band, mut q| {
-                    rows::with_scratch(|s| {
-                        widest(
-                            #[inline(always)]
-                            || job.weft(band, &mut q, s),
-                        );
-                    });
-                });
-            }
-        }
+            },
+        );
+        (self.q, self.warp) = (q, warp);
+    }
+
+    /// The warp's threads, then what stands in the way.
+    pub(crate) fn hold(&mut self, sheet: &Sheet) {
+        let (nx, parallel) = (sheet.nx, worth_threads(sheet));
+        let mut q = std::mem::take(&mut self.q);
+        let mut warp = std::mem::take(&mut self.warp);
         let job = columns::Columns {
             sheet,
             x_old: &self.x_old,
             history: self.history,
-            hp,
-            damping,
+            hp: self.hp,
+            damping: sheet.mechanics.stretch_damping / self.hp,
         };
         let solve = |(k, block): (usize, &mut Block)| {
             rows::with_scratch(|s| {
@@ -228,16 +274,19 @@ impl Stepper {
         over_bands(&mut q, rows::BAND * nx, parallel, |band, q| {
             columns::collect(&warp, band * rows::BAND, nx, q);
         });
-        if let Some(contact) = &mut contact {
-            contact.resolve(sheet, &mut q, hp, Stage::Part);
-        }
         self.obstacles.resolve(self.window, sheet, &mut q);
+        (self.q, self.warp) = (q, warp);
+    }
+
+    /// The end of a step: the new place and velocity.
+    pub(crate) fn finish(&mut self, sheet: &mut Sheet) {
         let third = if self.history { 1.0 / 3.0 } else { 0.0 };
         for c in 0..3 {
             let (x, xo, vo) = (&sheet.x[c], &mut self.x_old[c], &mut self.v_old[c]);
+            let (q, r) = (&self.q[c], 1.0 / self.hp);
             widest(
                 #[inline(always)]
-                || columns::finish(x, &q[c], xo, vo, third, 1.0 / hp),
+                || columns::finish(x, q, xo, vo, third, r),
             );
             // `x_old` now holds the new place and `v_old` the new velocity.
             std::mem::swap(&mut sheet.x[c], xo);
@@ -245,11 +294,10 @@ impl Stepper {
         }
         if !self.history {
             // The next step has h' = 2/3 of this one's.
-            for lambda in warp.iter_mut().flat_map(|b| &mut b.lambda).flatten() {
+            for lambda in self.warp.iter_mut().flat_map(|b| &mut b.lambda).flatten() {
                 *lambda *= 4.0 / 9.0;
             }
         }
-        (self.q, self.warp, self.self_contact) = (q, warp, contact);
         self.history = true;
     }
 }

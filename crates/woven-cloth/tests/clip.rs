@@ -264,6 +264,59 @@ fn a_curtain_drawn_to_a_fifth_of_its_rail_stays_whole() {
     );
     assert!((heading - 0.2).abs() < 1e-9 && (s.x[0][0] + 0.5).abs() < 1e-9);
     assert!(strain < 0.1, "{strain}");
+    assert_eq!(through, 0);
+}
+
+#[test]
+fn a_lace_behind_a_drape_makes_two_files_and_neither_passes_through_the_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.glb");
+    let text = "width = 0.6\nheight = 0.8\npleats = 4\ncolumns = 33\nrows = 21\nsettle = 0.3\nwarm_up = 0.0\nframes = 24\nfabric = \"drape\"\nrail_depth = 0.1\n[wind]\nspeed = 3.0\nramp = 0.2\n[second]\nfabric = \"lace\"\nrail_depth = -0.1\npleats = 5";
+    let near = text.replace("rail_depth = 0.1", "rail_depth = -0.06");
+    let e = Simulation::new(&near.parse().unwrap()).unwrap_err();
+    assert!(e.to_string().contains("second.rail_depth"), "{e}");
+    let spec: CurtainSpec = text.parse().unwrap();
+    let mut stops = 0;
+    let clip = loop {
+        match simulate_to(&spec, &path, 2, &mut |done, _| match done {
+            12 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }) {
+            Ok(clip) => break clip,
+            Err(_) => stops += 1,
+        }
+    };
+    assert_eq!(stops, 1);
+    assert!(
+        clip == simulate(&spec, &mut go).unwrap(),
+        "a stop changes no bit of two curtains"
+    );
+    let (first, second) = (
+        CurtainClip::read(&path).unwrap(),
+        CurtainClip::read(&woven_cloth::second_path(&path)).unwrap(),
+    );
+    assert_eq!((first.mesh.grid, second.mesh.grid), ([33, 21], [33, 21]));
+    // The wind drives the lace into the drape: they come near, and nothing pierces anything.
+    let mut least = f32::INFINITY;
+    for (frame, other) in first.frames.iter().zip(&second.frames) {
+        for p in &frame.positions[33 * 10..] {
+            for q in &other.positions[33 * 10..] {
+                let d2: f32 = (0..3).map(|c| (p[c] - q[c]).powi(2)).sum();
+                least = least.min(d2);
+            }
+        }
+    }
+    let through: usize = clip
+        .frames
+        .iter()
+        .map(|f| woven_cloth::crossings(&f.positions, &clip.mesh))
+        .sum();
+    println!(
+        "two curtains: nearest vertices {:.4} m, {through} crossings",
+        least.sqrt()
+    );
+    assert_eq!(through, 0);
+    assert!(least.sqrt() < 0.03, "they never met: {} m", least.sqrt());
 }
 
 #[test]

@@ -63,7 +63,7 @@ pub(crate) fn base_weights(points: &Points, options: &Options) -> Vec<f64> {
 }
 
 /// Standard errors by which the rows are weighted: in the linear metric, where all rows have one.
-fn sigmas(points: &Points, metric: Metric) -> Option<Vec<f64>> {
+pub(crate) fn sigmas(points: &Points, metric: Metric) -> Option<Vec<f64>> {
     let one = |p: &Point| p.sigma.filter(|&s| s > 0.0 && metric == Metric::Linear);
     points.points.iter().map(one).collect()
 }

@@ -4,7 +4,7 @@
 //! the lobe, and the thousands of other values would bend the gap. Therefore the straight-through rows alone decide the gap, the
 //! other rows alone decide the scattering, each given the other, in turn until both stand.
 
-use crate::finish::{Finished, at_bounds, base_weights, finish, finish_with_profiles};
+use crate::finish::{Finished, at_bounds, base_weights, finish, finish_with_profiles, sigmas};
 use crate::fit::Options;
 use crate::measurement::shared::{Kind, shifted};
 use crate::measurement::{Point, Points};
@@ -26,7 +26,8 @@ pub(crate) fn with_gap(
 ) -> Option<Finished> {
     let off = |points: &Points| points.filter(|p| !p.is_peak());
     let (coarse_off, full_off) = (off(coarse), off(full));
-    let mut gap = gap_alone(full, None);
+    let weighted = sigmas(full, options.metric).is_some();
+    let mut gap = gap_alone(full, None, weighted);
     let mut held = spec.holding_gap(gap);
     let (mut x, agreeing) = search(&held, &coarse_off, &full_off, options, floor);
     let mut part = None;
@@ -45,7 +46,7 @@ pub(crate) fn with_gap(
             points: &peaks,
         }
         .model(&fit.k, &fit.x);
-        gap = gap_alone(full, Some(&scattered));
+        gap = gap_alone(full, Some(&scattered), weighted);
         held = spec.holding_gap(gap);
         x.clone_from(&fit.x);
         part = Some(fit);
@@ -69,12 +70,18 @@ pub(crate) fn with_gap(
     for (i, w) in off.zip(&part.weights) {
         weights[i] = *w;
     }
+    if weighted {
+        let rows = weights.iter_mut().zip(&full.points);
+        rows.filter(|(_, p)| p.is_peak())
+            .for_each(|(w, p)| *w /= p.own);
+    }
     let eval = Evaluator { spec, points: full };
     let mut joint = Joint::new(eval, weights, options.metric, floor);
     let start: Vec<f64> = k.iter().chain(&x).copied().collect();
     let (mut r, mut jacobian) = (vec![0.0; m], vec![0.0; m * n]);
     joint.evaluate(&start, &mut r, Some(&mut jacobian));
-    // Each group in units of its own scatter; with hardly more rows than parameters 2 % of the level is taken for it.
+    // Each group in units of its own scatter; with hardly more rows than parameters their standard errors are taken for it, or
+    // where they have none 2 % of the level.
     let sum = |peaks: bool, value: &dyn Fn(usize) -> f64| {
         let rows = (0..m).filter(|&i| full.points[i].is_peak() == peaks);
         rows.fold((0usize, 0.0), |(n, s), i| (n + 1, s + value(i) * value(i)))
@@ -85,6 +92,8 @@ pub(crate) fn with_gap(
         let level = sum(peaks, &|i| full.points[i].f).1 / rows.max(1) as f64;
         let variance = if rows > 2 * spent {
             (squares / (rows - spent) as f64).max(1e-24 * level)
+        } else if weighted {
+            1.0
         } else {
             4e-4 * level
         };
@@ -132,9 +141,18 @@ pub(crate) fn with_gap(
     })
 }
 
+/// What a straight-through row counts for, in transmittance: by its own standard error, or as the others.
+fn weight(p: &Point, weighted: bool) -> f64 {
+    match p.sigma {
+        Some(sigma) if weighted => p.gap_density / (p.own * sigma),
+        _ => 1.0,
+    }
+}
+
 /// The weave whose openness comes nearest to the straight-through rows, less what is `scattered` into them.
-fn gap_alone(points: &Points, scattered: Option<&[f64]>) -> [f64; 3] {
-    struct Rows(Vec<(Vec3<f64>, f64)>);
+fn gap_alone(points: &Points, scattered: Option<&[f64]>, weighted: bool) -> [f64; 3] {
+    /// Direction, transmittance, weight.
+    struct Rows(Vec<(Vec3<f64>, f64, f64)>);
     impl Residuals for Rows {
         fn rows(&self) -> usize {
             self.0.len()
@@ -148,12 +166,12 @@ fn gap_alone(points: &Points, scattered: Option<&[f64]>) -> [f64; 3] {
         fn evaluate(&mut self, x: &[f64], r: &mut [f64], mut jac: Option<&mut [f64]>) -> bool {
             let m = r.len();
             let x: [Dual<3>; 3] = std::array::from_fn(|i| Dual::variable(x[i], i));
-            for (i, (l, t)) in self.0.iter().enumerate() {
+            for (i, (l, t, w)) in self.0.iter().enumerate() {
                 let o = openness(x[0], x[1], x[2], l.cast());
-                r[i] = o.v - t;
+                r[i] = w * (o.v - t);
                 if let Some(jac) = jac.as_deref_mut() {
                     for (j, d) in o.d.iter().enumerate() {
-                        jac[j * m + i] = *d;
+                        jac[j * m + i] = w * d;
                     }
                 }
             }
@@ -165,14 +183,19 @@ fn gap_alone(points: &Points, scattered: Option<&[f64]>) -> [f64; 3] {
         |i: usize, f: f64, direct: bool| f - scattered.filter(|_| !direct).map_or(0.0, |s| s[i]);
     let mut rows = Rows(
         peaks
-            .map(|(i, p)| (p.l, value(i, p.f, p.direct_only) / p.gap_density))
+            .map(|(i, p)| {
+                let t = value(i, p.f, p.direct_only) / p.gap_density;
+                (p.l, t, weight(p, weighted))
+            })
             .collect(),
     );
     let near = rows
         .0
         .iter()
         .max_by(|a, b| a.0.z.abs().total_cmp(&b.0.z.abs()));
-    let Some(&(_, t)) = near else { return [0.5; 3] };
+    let Some(&(_, t, _)) = near else {
+        return [0.5; 3];
+    };
     // A square weave of this openness, and two that are closer along one yarn.
     let g = 1.0 - t.clamp(0.0, 1.0).sqrt();
     let tries = [0.2, 0.5, 1.0]
@@ -188,7 +211,7 @@ fn gap_alone(points: &Points, scattered: Option<&[f64]>) -> [f64; 3] {
     let Some(mut best) = best else {
         return [g, g, 0.5];
     };
-    if let Some(whitening) = shared_by_peaks(points, &best.x, best.sse) {
+    if let Some(whitening) = shared_by_peaks(points, &best.x, best.sse, weighted) {
         let inner = &mut rows;
         best = solve(
             &mut Whitened {
@@ -203,7 +226,7 @@ fn gap_alone(points: &Points, scattered: Option<&[f64]>) -> [f64; 3] {
 }
 
 /// How straight-through rows become independent of the errors that they share; none where there are none.
-fn shared_by_peaks(points: &Points, x: &[f64], sse: f64) -> Option<Whitening> {
+fn shared_by_peaks(points: &Points, x: &[f64], sse: f64, weighted: bool) -> Option<Whitening> {
     let peaks = points.filter(Point::is_peak);
     let m = peaks.points.len();
     let open = |points: &Points| -> Vec<f64> {
@@ -215,6 +238,11 @@ fn shared_by_peaks(points: &Points, x: &[f64], sse: f64) -> Option<Whitening> {
     for s in &points.shared {
         match s.kind {
             Kind::Scale => columns.extend(here.iter().map(|t| t * s.sigma)),
+            Kind::SolidAngle => columns.extend(
+                here.iter()
+                    .zip(&peaks.points)
+                    .map(|(t, p)| if p.direct_only { 0.0 } else { t * s.sigma }),
+            ),
             Kind::Floor => columns.extend(peaks.points.iter().map(|p| match p.direct_only {
                 true => 0.0,
                 false => s.sigma / p.v.z.abs() / p.gap_density,
@@ -229,9 +257,15 @@ fn shared_by_peaks(points: &Points, x: &[f64], sse: f64) -> Option<Whitening> {
     if columns.is_empty() {
         return None;
     }
+    let weights: Vec<f64> = peaks.points.iter().map(|p| weight(p, weighted)).collect();
+    for (value, w) in columns.iter_mut().zip(weights.iter().cycle()) {
+        *value *= w;
+    }
     let level = here.iter().map(|t| t * t).sum::<f64>() / m as f64;
     let variance = if m > 6 {
         sse / (m - 3) as f64
+    } else if weighted {
+        1.0
     } else {
         4e-4 * level
     };

@@ -31,20 +31,20 @@ impl Whitening {
         if columns.is_empty() {
             return Some(Self::default());
         }
-        let svd = DMatrix::from_column_slice(m, columns.len() / m, columns)
-            .try_svd(true, false, 1e-15, 10_000)?;
-        let floor = svd.singular_values.max() / UNKNOWN;
-        if floor == 0.0 {
-            return Some(Self::default());
+        // U and singular values by GᵀG = V S² Vᵀ: what is lost of singular values below 1e-7 of the greatest is nothing here.
+        let g = DMatrix::from_column_slice(m, columns.len() / m, columns);
+        let eigen = (g.transpose() * &g).symmetric_eigen();
+        let greatest = eigen.eigenvalues.max().max(0.0).sqrt();
+        let floor = scatter.max(greatest / UNKNOWN);
+        let mut directions = Vec::new();
+        for (v, square) in eigen.eigenvectors.column_iter().zip(&eigen.eigenvalues) {
+            let value = square.max(0.0).sqrt();
+            if value > 1e-7 * greatest {
+                let u = (&g * v / value).iter().copied().collect();
+                directions.push((u, 1.0 - 1.0 / f64::hypot(1.0, value / floor)));
+            }
         }
-        let take = |value: f64| 1.0 - 1.0 / f64::hypot(1.0, value / scatter.max(floor));
-        let u = svd.u?;
-        let directions = u.column_iter().zip(svd.singular_values.iter());
-        Some(Self {
-            directions: directions
-                .map(|(u, &v)| (u.iter().copied().collect(), take(v)))
-                .collect(),
-        })
+        Some(Self { directions })
     }
 
     /// Whitens a column.
@@ -99,6 +99,11 @@ fn changes(eval: Evaluator<'_>, both: &[f64]) -> Option<Vec<Sides>> {
     let along = |kind: Kind, sigma: f64| -> Option<Vec<f64>> {
         Some(match kind {
             Kind::Scale => here.iter().map(|f| f * (1.0 + sigma)).collect(),
+            Kind::SolidAngle => {
+                let rows = here.iter().zip(&points.points);
+                rows.map(|(f, p)| if p.direct_only { *f } else { f * (1.0 + sigma) })
+                    .collect()
+            }
             Kind::Floor => {
                 let rows = here.iter().zip(&points.points);
                 rows.map(|(f, p)| match p.direct_only {
@@ -263,19 +268,24 @@ mod tests {
 
     #[test]
     fn whitened_rows_have_the_inverse_covariance() {
-        // Two shared errors over three rows, scatter 0.5: apply twice = s² (s² 1 + G Gᵀ)⁻¹.
-        let g = [1.0, 2.0, -1.0, 0.3, 0.0, 0.7];
-        let w = Whitening::new(&g, 3, 0.5).unwrap();
-        let gm = DMatrix::from_column_slice(3, 2, &g);
-        let cov = &gm * gm.transpose() + DMatrix::identity(3, 3) * 0.25;
-        let want = cov.try_inverse().unwrap() * 0.25;
-        for j in 0..3 {
-            let mut e = [0.0; 3];
-            e[j] = 1.0;
-            w.apply(&mut e);
-            w.apply(&mut e);
-            for (i, e) in e.iter().enumerate() {
-                assert!((e - want[(i, j)]).abs() < 1e-12, "{i} {j}");
+        // Two shared errors over three rows, scatter 0.5: apply twice = s² (s² 1 + G Gᵀ)⁻¹. The second pair moves the rows alike,
+        // as a factor on all values and one on nearly all do.
+        for g in [
+            [1.0, 2.0, -1.0, 0.3, 0.0, 0.7],
+            [1.0, 2.0, -1.0, 0.3, 0.6, -0.3],
+        ] {
+            let w = Whitening::new(&g, 3, 0.5).unwrap();
+            let gm = DMatrix::from_column_slice(3, 2, &g);
+            let cov = &gm * gm.transpose() + DMatrix::identity(3, 3) * 0.25;
+            let want = cov.try_inverse().unwrap() * 0.25;
+            for j in 0..3 {
+                let mut e = [0.0; 3];
+                e[j] = 1.0;
+                w.apply(&mut e);
+                w.apply(&mut e);
+                for (i, e) in e.iter().enumerate() {
+                    assert!((e - want[(i, j)]).abs() < 1e-12, "{i} {j}");
+                }
             }
         }
     }

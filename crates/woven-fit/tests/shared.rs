@@ -189,23 +189,26 @@ fn the_gap_knows_of_a_shared_scale() {
     let make = |named: bool| {
         move |seed: u64| {
             let scale = 1.0 + 0.03 * normal(seed ^ 0x123, 0);
-            let mut scan = scan(seed, scale, 0.0, 0.0, 0.0);
+            let angle = 1.0 + 0.02 * normal(seed ^ 0x123, 1);
+            let mut scan = scan(seed, scale * angle, 0.0, 0.0, 0.0);
+            scan.samples.iter_mut().for_each(|s| s.sigma = Some(1e-3));
             for (i, theta) in [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0]
                 .into_iter()
                 .enumerate()
             {
                 for (j, phi) in [0.0, 90.0].into_iter().enumerate() {
                     let l = at(theta, phi);
-                    let noise = 1e-4 * normal(seed ^ 0x321, (2 * i + j) as u64);
+                    let sigma = if i % 2 == 0 { 1e-4 } else { 1e-3 };
+                    let noise = sigma * normal(seed ^ 0x321, (2 * i + j) as u64);
                     scan.direct.push(Direct {
                         l,
                         transmittance: scale * openness(GAP[0], GAP[1], GAP[2], l) + noise,
-                        sigma: None,
+                        sigma: Some(sigma),
                     });
                 }
             }
             if named {
-                scan.comments = vec!["shared,scale,0.03".into()];
+                scan.comments = vec!["shared,scale,0.03".into(), "shared,solid_angle,0.02".into()];
             }
             scan
         }

@@ -4,6 +4,7 @@
 //! the offsets that naga computes from the shader's structs.
 
 mod lights;
+mod mips;
 mod sky;
 
 use anyhow::{Result, bail, ensure};
@@ -30,10 +31,12 @@ pub struct Shade {
     pub n1: [f32; 4],
     /// Of the third corner.
     pub n2: [f32; 4],
-    /// Direction of the weft (dp/du), then nothing.
+    /// Direction of the weft (dp/du), then -1 where the texture is mirrored, else 1.
     pub weft: [f32; 4],
-    /// v of the three corners, then nothing.
+    /// v of the three corners, then the area of the triangle in (u, v) over its area in metres.
     pub v: [f32; 4],
+    /// Colours of the corners, sRGB of 8 bits, red lowest; then 1 where there are any.
+    pub colors: [u32; 4],
     /// Row of the material.
     pub material: u32,
     /// Row of the light that this triangle is (part of), or [`NONE`].
@@ -72,6 +75,12 @@ pub struct MaterialRow {
     pub gap: f32,
     /// Cover by yarn in every direction, where [`EVEN`].
     pub cover: f32,
+    /// Row of the texture that bends the normal or [`NONE`].
+    pub normal_texture: u32,
+    /// Multiplies its first two numbers.
+    pub normal_scale: f32,
+    /// Nothing.
+    pub unused: [u32; 2],
 }
 
 /// [`MaterialRow::flags`]: no lobes, diffuse terms only.
@@ -84,16 +93,18 @@ pub const TRANSMITS: u32 = 4;
 pub const EMITS: u32 = 8;
 /// [`MaterialRow::flags`]: the same cover in every direction.
 pub const EVEN: u32 = 16;
+/// [`MaterialRow::flags`]: textures do not colour the reflection lobe.
+pub const PLAIN_GLOSS: u32 = 32;
 
 /// A texture and how to reach it.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct TextureRow {
-    /// First row of the affine map of (u, v, 1), then nothing.
+    /// First row of the affine map of (u, v, 1), then texels a square of side 1 in (u, v).
     pub map_u: [f32; 4],
-    /// Second row.
+    /// Second row, then the number of smaller copies after the picture, each of half the side, down to one texel.
     pub map_v: [f32; 4],
-    /// First texel.
+    /// First texel; the smaller copies follow.
     pub first: u32,
     /// Columns.
     pub width: u32,
@@ -172,6 +183,10 @@ pub struct Globals {
     pub offset: f32,
     /// 4, the taps of a bilinear texture: a loop bound that shader compilers do not know.
     pub taps: u32,
+    /// First light that is no surface: suns are looked for from there.
+    pub others: u32,
+    /// Nothing.
+    pub spare: [u32; 3],
 }
 
 /// The whole table.
@@ -262,6 +277,7 @@ impl Table {
             first,
         };
         table.fill_shade(None);
+        table.fill_colors(scene);
         table.fill_gaps();
         sky::fill(&mut table, scene, light_layers);
         lights::fill(&mut table, scene, light_layers);
@@ -276,6 +292,11 @@ impl Table {
     #[must_use]
     pub fn triangles(&self) -> usize {
         self.corners.len()
+    }
+
+    /// A mesh as it is now.
+    pub(crate) fn mesh(&self, mesh: usize) -> Option<&Mesh> {
+        self.meshes.get(mesh)
     }
 
     /// Moves the vertices of mesh `mesh`: refits the ray structure and renews normals and lights. `normals` may be
@@ -327,12 +348,32 @@ impl Table {
             if only.is_none_or(|o| o == m as usize) {
                 *row = Shade {
                     light: row.light,
+                    colors: row.colors,
                     mesh: m,
                     triangle: t,
                     ..shade_row(&meshes[m as usize], t as usize)
                 };
             }
         });
+    }
+
+    fn fill_colors(&mut self, scene: &Scene) {
+        if scene.colors.is_empty() {
+            return;
+        }
+        let byte = |v: f32| (crate::film::srgb_encode(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u32;
+        let packed = |c: &[f32; 3]| byte(c[0]) | byte(c[1]) << 8 | byte(c[2]) << 16 | 255 << 24;
+        let mut lists = vec![None; self.meshes.len()];
+        for (mesh, colors) in &scene.colors {
+            lists[*mesh] = Some(colors.iter().map(packed).collect::<Vec<_>>());
+        }
+        for shade in self.shade.iter_mut().filter(|s| s.material != NONE) {
+            if let Some(list) = &lists[shade.mesh as usize] {
+                let corners = self.meshes[shade.mesh as usize].indices[shade.triangle as usize];
+                let [a, b, c] = corners.map(|i| list[i as usize]);
+                shade.colors = [a, b, c, 1];
+            }
+        }
     }
 
     fn fill_gaps(&mut self) {
@@ -377,8 +418,15 @@ fn shade_row(mesh: &Mesh, t: usize) -> Shade {
         n0: n0.extend(t0.x).into(),
         n1: n1.extend(t1.x).into(),
         n2: n2.extend(t2.x).into(),
-        weft: weft.extend(0.0).into(),
-        v: [t0.y, t1.y, t2.y, 0.0],
+        // With v running down in the picture, a picture seen the right way round has a negative determinant.
+        weft: weft.extend(if det > 0.0 { -1.0 } else { 1.0 }).into(),
+        v: [
+            t0.y,
+            t1.y,
+            t2.y,
+            det.abs() / e1.cross(e2).length().max(1e-20),
+        ],
+        colors: [0; 4],
         material: mesh.material as u32,
         light: NONE,
         mesh: 0,
@@ -403,6 +451,7 @@ fn material_row(
     set(!black(0) || !black(1), TRANSMITS);
     set(m.emission.iter().any(|&e| e > 0.0), EMITS);
     set(even, EVEN);
+    set(m.plain_gloss, PLAIN_GLOSS);
     MaterialRow {
         linear: m.linear.map(|k| [k[0], k[1], k[2], 0.0]),
         shape: m.shape,
@@ -424,6 +473,9 @@ fn material_row(
             -1.0
         },
         cover: 1.0 - optics::openness(&m.shape, Vec3::Z).clamp(0.0, 1.0),
+        normal_texture: textures.row(m.normal_texture, scene),
+        normal_scale: m.normal_scale,
+        unused: [0; 2],
     }
 }
 
@@ -432,22 +484,21 @@ fn material_row(
 struct Textures {
     rows: Vec<TextureRow>,
     texels: Vec<u32>,
-    /// (number in the scene, first texel)
-    there: Vec<(usize, u32)>,
+    /// (number in the scene, first texel, smaller copies)
+    there: Vec<(usize, u32, u32)>,
 }
 
 impl Textures {
     fn row(&mut self, used: Option<TextureUse>, scene: &Scene) -> u32 {
         let Some(used) = used else { return NONE };
         let texture = &scene.textures[used.texture];
-        let first = match self.there.iter().find(|t| t.0 == used.texture) {
-            Some(&(_, first)) => first,
+        let (first, copies) = match self.there.iter().find(|t| t.0 == used.texture) {
+            Some(&(_, first, copies)) => (first, copies),
             None => {
                 let first = self.texels.len() as u32;
-                self.texels
-                    .extend(texture.pixels.iter().map(|&p| u32::from_le_bytes(p)));
-                self.there.push((used.texture, first));
-                first
+                let copies = mips::append(texture, &mut self.texels);
+                self.there.push((used.texture, first, copies));
+                (first, copies)
             }
         };
         let wrap = |w: Wrap| match w {
@@ -456,9 +507,10 @@ impl Textures {
             Wrap::Clamp => 2,
         };
         let [[a, b, c], [d, e, f]] = used.transform;
+        let density = (a * e - b * d).abs() * texture.width as f32 * texture.height as f32;
         self.rows.push(TextureRow {
-            map_u: [a, b, c, 0.0],
-            map_v: [d, e, f, 0.0],
+            map_u: [a, b, c, density],
+            map_v: [d, e, f, copies as f32],
             first,
             width: texture.width,
             height: texture.height,
@@ -520,9 +572,14 @@ fn check(scene: &Scene) -> Result<()> {
             "material \"{}\" has a factor that is negative or not a number",
             m.name
         );
-        for used in [m.color_texture, m.coverage_texture, m.emission_texture]
-            .into_iter()
-            .flatten()
+        for used in [
+            m.color_texture,
+            m.coverage_texture,
+            m.emission_texture,
+            m.normal_texture,
+        ]
+        .into_iter()
+        .flatten()
         {
             ensure!(
                 used.texture < scene.textures.len(),
@@ -532,6 +589,16 @@ fn check(scene: &Scene) -> Result<()> {
                 scene.textures.len()
             );
         }
+    }
+    for (mesh, colors) in &scene.colors {
+        ensure!(
+            scene
+                .meshes
+                .get(*mesh)
+                .is_some_and(|m| m.positions.len() == colors.len())
+                && colors.iter().flatten().all(|c| c.is_finite()),
+            "there are colours of vertices for mesh {mesh}, which is not there or has another number of vertices"
+        );
     }
     let whole = |t: &Texture| {
         t.width > 0 && t.height > 0 && t.pixels.len() == t.width as usize * t.height as usize

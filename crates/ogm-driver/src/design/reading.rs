@@ -7,12 +7,6 @@ use woven_bsdf::vec3::Vec3;
 use super::Design;
 use crate::pose::Pose;
 use crate::rig::Sight;
-use crate::sim::optics::crossways;
-
-/// Relative error of a reading that no exposure takes away, beside what the rig file states: what repeats of one pose differ by on a good day.
-const FLOOR: f64 = 5e-4;
-/// Step for slopes over directions, radians.
-const TILT: f64 = 2e-3;
 
 impl Design {
     fn f(&self, values: &[f64], l: [f64; 3], v: [f64; 3]) -> f64 {
@@ -20,21 +14,17 @@ impl Design {
         self.model.eval(values, vec(l), vec(v))
     }
 
-    /// Standard error of one reading of f at a pose, 1/sr, as the merge states it: shot and read noise at the longest exposure that fits, the floor,
-    /// the angles' error times the slope, and the aperture's blur.
+    /// What is its own of the standard error of one reading of f at a pose, 1/sr: what all readings share (scale, offsets of the axes) the fit takes apart,
+    /// and it averages over the aperture itself.
     pub(super) fn sigma(&self, pose: &Pose, f: f64) -> f64 {
-        let d = &self.detector;
-        let noise = self.noise(f, d.solid_angle() * pose.view()[2].abs().max(1e-3));
-        let (slope, curvature) = self.shape(pose, f);
-        let radius = (d.aperture_deg / 2.0).to_radians();
-        let angle = d.angle_deg.to_radians() * std::f64::consts::SQRT_2;
-        [slope * angle, radius * radius / 8.0 * curvature]
-            .into_iter()
-            .fold(noise, f64::hypot)
+        self.noise(
+            f,
+            self.detector.solid_angle() * pose.view()[2].abs().max(1e-3),
+        )
     }
 
     /// Standard error of `value`, of which a share `seen` times the direct beam reaches the detector: shot and read noise at the longest exposure that
-    /// fits, and the floor.
+    /// fits, and the noise of the reference diode.
     fn noise(&self, value: f64, seen: f64) -> f64 {
         let (d, per_ms) = (&self.detector, self.beam * seen);
         let rate = per_ms * value.max(0.0);
@@ -42,24 +32,7 @@ impl Design {
         let fits = |t: &f64| rate * t <= 0.7 * d.full_scale;
         let t = ladder.iter().copied().rfind(fits).unwrap_or(ladder[0]);
         let noise = (rate * t / d.electrons_per_count + d.read_noise.powi(2)).sqrt();
-        let floor = FLOOR.hypot(d.reference_noise).hypot(d.linearity) * value;
-        floor.hypot(noise / (per_ms * t))
-    }
-
-    /// Magnitudes of the slope of f over the view direction (per radian) and of its Laplacian (per square radian).
-    fn shape(&self, pose: &Pose, f: f64) -> (f64, f64) {
-        let (l, v) = (pose.light(), pose.view());
-        let (x, y) = crossways(v);
-        let tilted = |t: [f64; 3], angle: f64| {
-            let (s, c) = angle.sin_cos();
-            self.f(&self.values, l, [0, 1, 2].map(|i| c * v[i] + s * t[i]))
-        };
-        let [east, west, north, south] =
-            [(x, TILT), (x, -TILT), (y, TILT), (y, -TILT)].map(|(t, angle)| tilted(t, angle));
-        let slope = (east - west).hypot(north - south) / (2.0 * TILT);
-        let laplacian = (east + west + north + south - 4.0 * f) / (TILT * TILT);
-        let known = |x: f64| if x.is_finite() { x.abs() } else { 0.0 };
-        (known(slope), known(laplacian))
+        (d.reference_noise * value).hypot(noise / (per_ms * t))
     }
 
     /// Share of the beam that goes straight through: only the sheet has gaps.

@@ -145,7 +145,7 @@ fn over_aperture(v: [f64; 3], aperture_deg: f64, g: impl Fn([f64; 3]) -> f64) ->
 }
 
 /// Two unit vectors across `v` and across each other.
-pub(crate) fn crossways(v: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+fn crossways(v: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let a = if v[0].abs() < 0.5 {
         [1.0, 0.0, 0.0]
     } else {

@@ -289,6 +289,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<CurtainClip> {
             number(&about["grid"][0])? as usize,
             number(&about["grid"][1])? as usize,
         ],
+        second: None,
     };
     let fps = number(&about["fps"])?;
     let mut frames = Vec::new();

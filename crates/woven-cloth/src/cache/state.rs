@@ -73,7 +73,7 @@ impl Saved {
         };
         let sim = Simulation::load(spec, &state)
             .map_err(|e| Error::Checkpoint(format!("{}: {e}", self.state.display())))?;
-        let n = sim.sheet().len();
+        let n = sim.count();
         let frames = sim.frame_index();
         let mut bytes = Vec::new();
         std::fs::File::open(&self.part)

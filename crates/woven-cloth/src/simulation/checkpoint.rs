@@ -1,14 +1,14 @@
 //! The whole state of a simulation as bytes, and back: a run that goes on has the bits of one that never stopped.
 
 use super::Simulation;
-use crate::contact::Pair;
 use crate::error::{Error, Result};
+use crate::force::Friction;
 use crate::random::fnv1a;
 use crate::spec::CurtainSpec;
 
-const MAGIC: &[u8; 8] = b"WOVENCL3";
-/// Magic, fingerprint, tick, frame, settled, history, count of contacts.
-const HEAD: usize = 7 * 8;
+const MAGIC: &[u8; 8] = b"WOVENCL4";
+/// Magic, fingerprint, tick, frame, settled, history.
+const HEAD: usize = 6 * 8;
 
 impl Simulation {
     /// A fingerprint of everything that decides the motion; the number of frames does not.
@@ -21,10 +21,6 @@ impl Simulation {
         fnv1a(toml::to_string(&spec).unwrap_or_default().as_bytes())
     }
 
-    fn contacts(&self) -> impl Iterator<Item = &Pair> {
-        self.stepper.self_contact.iter().flat_map(|c| c.active())
-    }
-
     /// The whole state as bytes; `load` continues with the same bits.
     #[must_use]
     pub fn save(&self) -> Vec<u8> {
@@ -35,22 +31,20 @@ impl Simulation {
             self.tick,
             self.frame,
             u64::from(self.settled),
-            u64::from(self.stepper.history),
-            self.contacts().count() as u64,
+            u64::from(self.layers[0].stepper.history),
         ] {
             out.extend_from_slice(&number.to_le_bytes());
         }
-        let (s, t, a) = (&self.sheet, &self.stepper, &self.air);
-        let tensions = t.tensions(s.nx, s.ny);
-        let fields = [&s.x, &s.v, &t.x_old, &t.v_old, &a.now, &a.next];
-        for value in fields.into_iter().flatten().flatten().chain(&tensions) {
-            out.extend_from_slice(&value.to_le_bytes());
-        }
-        for pair in self.contacts() {
-            for word in [pair.a, pair.b] {
-                out.extend_from_slice(&word.to_le_bytes());
+        for layer in &self.layers {
+            let (s, t, a) = (&layer.sheet, &layer.stepper, &layer.air);
+            let tensions = t.tensions(s.nx, s.ny);
+            let fields = [&s.x, &s.v, &t.x_old, &t.v_old, &a.now, &a.next];
+            for value in fields.into_iter().flatten().flatten().chain(&tensions) {
+                out.extend_from_slice(&value.to_le_bytes());
             }
-            out.extend(pair.side.map(|s| s as u8));
+            for value in t.friction.iter().flat_map(Friction::state) {
+                out.extend_from_slice(&value.to_le_bytes());
+            }
         }
         let sum = fnv1a(&out);
         out.extend_from_slice(&sum.to_le_bytes());
@@ -78,14 +72,15 @@ impl Simulation {
             ));
         }
         let mut sim = Self::new(spec)?;
-        let n = sim.sheet.len();
-        let cells = sim.air.now[0].len();
-        let values = 12 * n + 6 * cells + n;
-        let pairs = usize::try_from(number(48)).unwrap_or(usize::MAX);
-        let length = pairs
-            .checked_mul(10)
-            .and_then(|p| p.checked_add(HEAD + values * 8 + 8));
-        if length != Some(bytes.len()) {
+        let values: usize = sim
+            .layers
+            .iter()
+            .map(|l| {
+                let sliders = l.stepper.friction.iter().flat_map(Friction::state).count();
+                13 * l.sheet.len() + 6 * l.air.now[0].len() + sliders
+            })
+            .sum();
+        if bytes.len() != HEAD + values * 8 + 8 {
             return Err(damaged());
         }
         (sim.tick, sim.frame, sim.settled) = (number(16), number(24), number(32) != 0);
@@ -94,35 +89,26 @@ impl Simulation {
             at += 8;
             f64::from_bits(number(at - 8))
         };
-        let (s, t, a) = (&mut sim.sheet, &mut sim.stepper, &mut sim.air);
-        t.history = number(40) != 0;
-        for field in [
-            &mut s.x,
-            &mut s.v,
-            &mut t.x_old,
-            &mut t.v_old,
-            &mut a.now,
-            &mut a.next,
-        ] {
-            for value in field.iter_mut().flatten() {
+        for layer in &mut sim.layers {
+            let (s, t, a) = (&mut layer.sheet, &mut layer.stepper, &mut layer.air);
+            t.history = number(40) != 0;
+            for field in [
+                &mut s.x,
+                &mut s.v,
+                &mut t.x_old,
+                &mut t.v_old,
+                &mut a.now,
+                &mut a.next,
+            ] {
+                for value in field.iter_mut().flatten() {
+                    *value = next();
+                }
+            }
+            let tensions: Vec<f64> = (0..s.len()).map(|_| next()).collect();
+            t.set_tensions(s, &tensions);
+            for value in t.friction.iter_mut().flat_map(Friction::state_mut) {
                 *value = next();
             }
-        }
-        let tensions: Vec<f64> = (0..n).map(|_| next()).collect();
-        t.set_tensions(s, &tensions);
-        if let Some(contact) = &mut t.self_contact {
-            let word = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-            let end = bytes.len() - 8;
-            contact.resume(
-                bytes[at..end]
-                    .chunks_exact(10)
-                    .map(|b| Pair {
-                        a: word(b),
-                        b: word(&b[4..]),
-                        side: [b[8] as i8, b[9] as i8],
-                    })
-                    .collect(),
-            );
         }
         Ok(sim)
     }

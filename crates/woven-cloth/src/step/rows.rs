@@ -95,6 +95,11 @@ impl Rows<'_> {
                 pred[k] = x[k] + (x[k] - xo[k]) * third + hp * vt[k];
             }
             s.f[c][..n].copy_from_slice(&t.air[c][k0..k0 + n]);
+            if let Some(friction) = &t.friction {
+                for (f, more) in s.f[c][..n].iter_mut().zip(&friction.force[c][k0..k0 + n]) {
+                    *f += more;
+                }
+            }
         }
         self.add_tension(lo..hi, j0.max(lo + 1) - 1..j1.min(hi - 1), s);
         let slab = Slab {

@@ -14,8 +14,10 @@ use woven_bsdf::vec3::Vec3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// A factor on every value: direct beam, white standard, solid angle.
+    /// A factor on every value: direct beam, white standard.
     Scale,
+    /// A factor on every scattered value, but not on straight-through rows: the aperture's solid angle.
+    SolidAngle,
     /// A dark level: σ/|cosθ_v| on every scattered value, 1/sr.
     Floor,
     /// The light's polar angle, degrees.
@@ -30,8 +32,9 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 6] = [
+    pub const ALL: [Kind; 7] = [
         Kind::Scale,
+        Kind::SolidAngle,
         Kind::Floor,
         Kind::LightTheta,
         Kind::LightPhi,
@@ -41,13 +44,14 @@ impl Kind {
 
     /// Whether it turns an axis.
     pub fn is_axis(self) -> bool {
-        !matches!(self, Kind::Scale | Kind::Floor)
+        !matches!(self, Kind::Scale | Kind::SolidAngle | Kind::Floor)
     }
 
     /// Its name in a file.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Scale => "scale",
+            Kind::SolidAngle => "solid_angle",
             Kind::Floor => "floor",
             Kind::LightTheta => "light_theta_deg",
             Kind::LightPhi => "light_phi_deg",
@@ -159,11 +163,15 @@ mod tests {
     #[test]
     fn lines_are_read_or_refused_in_words() {
         let (known, unknown) = shared(&scan(
-            "# shared,scale,4e-4\n# shared,view_phi_deg, 0.06\n# shared,dust,1\n",
+            "# shared,scale,4e-4\n# shared,solid_angle,0.01\n# shared,view_phi_deg, 0.06\n# shared,dust,1\n",
         ))
         .unwrap();
-        let (scale, phi) = (Kind::Scale, Kind::ViewPhi);
-        let want = [(scale, 4e-4), (phi, 0.06)].map(|(kind, sigma)| Shared { kind, sigma });
+        let want = [
+            (Kind::Scale, 4e-4),
+            (Kind::SolidAngle, 0.01),
+            (Kind::ViewPhi, 0.06),
+        ]
+        .map(|(kind, sigma)| Shared { kind, sigma });
         assert_eq!((known, unknown), (want.to_vec(), vec!["dust".to_owned()]));
         for bad in [
             "# shared,scale,0\n",

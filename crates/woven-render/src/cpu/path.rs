@@ -232,7 +232,7 @@ pub(super) fn begin(
             });
             break;
         };
-        let s = surface::surface(table, &hit);
+        let s = surface::surface(table, &hit, hit.t * view.up.length() / view.height as f32);
         let m = &table.materials[s.material as usize];
         let wo = s.local(-ray.d);
         let gap = surface::gap(m, &s, ray.d);
@@ -403,7 +403,7 @@ fn follow(
                 }
                 return second;
             };
-            let s = surface::surface(table, &hit);
+            let s = surface::surface(table, &hit, 0.0);
             let gap = surface::gap(&table.materials[s.material as usize], &s, d);
             if gap <= 0.0 || (gap < 1.0 && rng.coin() >= gap) {
                 break (hit, s, gap);

@@ -162,7 +162,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
         if (miss) {
             given = sky(ray.d);
         } else {
-            s = surface(hit);
+            s = surface(hit, select(0.0, hit.t * sqrt(length2(frame.up)) / f32(frame.height), camera));
             gap = gap_of(s.material, s, ray.d);
             // A path goes straight on through gaps, each by a coin.
             if (!camera && gap > 0.0) {
@@ -352,7 +352,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
 }
 
 fn add_discs(out: ptr<function, Taken>, d: vec3<f32>, passed: f32) {
-    for (var i = 0u; i < frame.globals.lights; i++) {
+    for (var i = frame.globals.others; i < frame.globals.lights; i++) {
         if (lights[i].kind == SUN && lights[i].u.y > 1e-4 && dot(d, lights[i].n) > lights[i].u.x) {
             add_light(out, false, lights[i].layer, lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
         }

@@ -18,6 +18,7 @@ const DOUBLE_SIDED: u32 = 2u;
 const TRANSMITS: u32 = 4u;
 const EMITS: u32 = 8u;
 const EVEN: u32 = 16u;
+const PLAIN_GLOSS: u32 = 32u;
 
 // LightRow.kind
 const RECT: u32 = 0u;
@@ -46,6 +47,7 @@ struct Shade {
     n2: vec4<f32>,
     weft: vec4<f32>,
     v: vec4<f32>,
+    colors: vec4<u32>,
     material: u32,
     light: u32,
     mesh: u32,
@@ -66,6 +68,9 @@ struct MaterialRow {
     alpha_cutoff: f32,
     gap: f32,
     cover: f32,
+    normal_texture: u32,
+    normal_scale: f32,
+    unused: vec2<u32>,
 }
 
 struct LightRow {
@@ -94,6 +99,8 @@ struct Globals {
     soft_lights: u32,
     offset: f32,
     taps: u32,
+    others: u32,
+    spare: array<u32, 3>,
 }
 
 struct Frame {

@@ -4,151 +4,17 @@
 //! and the measured values over that square (`rgb` or `spectra`), so that the samples sit where the material scatters:
 //! f cosθ_o = values(warp⁻¹(m)) D(m)/(4 σ(i)), m the half vector at (√(2θ_m/π), φ_m/2π + ½), D `ndf`, σ `sigma`.
 
+mod warp;
+
 use super::tensor_file::{Field, fields};
 use super::{Refused, read_bytes_at_most};
 use crate::vec3::Vec3;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::Path;
+use warp::{Grid, Slices, Warp};
 
 /// Largest file: the numbers are kept once and summed twice, which stays below 512 MiB.
 const LIMIT: u64 = 100 << 20;
-
-/// Values on a grid over the unit square, one slice per point of a grid of parameters; linear between all of them.
-#[derive(Clone, Debug)]
-struct Grid {
-    width: usize,
-    height: usize,
-    values: Vec<f32>,
-}
-
-/// The slices that surround a place in the parameters, with their shares.
-type Slices = [(usize, f64); 4];
-
-impl Grid {
-    fn blend(&self, slices: &[(usize, f64)], column: usize, row: usize) -> f64 {
-        let size = self.width * self.height;
-        slices
-            .iter()
-            .map(|&(s, w)| w * f64::from(self.values[s * size + row * self.width + column]))
-            .sum()
-    }
-    /// The cell of a coordinate, and where in it.
-    fn cell(x: f64, n: usize) -> (usize, f64) {
-        let x = x.clamp(0.0, 1.0) * (n - 1) as f64;
-        let i = (x as usize).min(n.saturating_sub(2));
-        (i, x - i as f64)
-    }
-    fn corners(
-        &self,
-        slices: &[(usize, f64)],
-        x: f64,
-        y: f64,
-    ) -> ([f64; 4], (usize, f64), (usize, f64)) {
-        let (cx, cy) = (Self::cell(x, self.width), Self::cell(y, self.height));
-        let at = |dx: usize, dy: usize| {
-            let (i, j) = (
-                (cx.0 + dx).min(self.width - 1),
-                (cy.0 + dy).min(self.height - 1),
-            );
-            self.blend(slices, i, j)
-        };
-        ([at(0, 0), at(1, 0), at(0, 1), at(1, 1)], cx, cy)
-    }
-    fn eval(&self, slices: &[(usize, f64)], x: f64, y: f64) -> f64 {
-        let ([a, b, c, d], (_, s), (_, t)) = self.corners(slices, x, y);
-        (a * (1.0 - s) + b * s) * (1.0 - t) + (c * (1.0 - s) + d * s) * t
-    }
-}
-
-/// A [`Grid`] as a density with its sums along rows and over rows.
-#[derive(Clone, Debug)]
-struct Warp {
-    density: Grid,
-    /// For each vertex the integral of its row from the left.
-    along: Grid,
-    /// For each row the integral of the rows below it; one column.
-    over: Grid,
-}
-
-impl Warp {
-    /// Each slice is scaled so that it integrates to 1; one without any light stays black.
-    fn new(mut density: Grid) -> Self {
-        let (w, h) = (density.width, density.height);
-        let (dx, dy) = (1.0 / (w.max(2) - 1) as f64, 1.0 / (h.max(2) - 1) as f64);
-        let mut along = vec![0.0f32; density.values.len()];
-        let mut over = Vec::with_capacity(density.values.len() / w.max(1));
-        for (slice, sums) in density
-            .values
-            .chunks_exact_mut(w * h)
-            .zip(along.chunks_exact_mut(w * h))
-        {
-            // Noise below zero is no density.
-            slice.iter_mut().for_each(|x| *x = x.max(0.0));
-            let mut rows = vec![0.0f64; h];
-            for (j, row) in rows.iter_mut().enumerate() {
-                let mut sum = 0.0;
-                for i in 1..w {
-                    sum += 0.5 * dx * f64::from(slice[j * w + i - 1] + slice[j * w + i]);
-                    sums[j * w + i] = sum as f32;
-                }
-                *row = sum;
-            }
-            let total: f64 = rows.windows(2).map(|r| 0.5 * dy * (r[0] + r[1])).sum();
-            let scale = if total > 0.0 { 1.0 / total } else { 0.0 };
-            slice
-                .iter_mut()
-                .chain(sums.iter_mut())
-                .for_each(|x| *x = (f64::from(*x) * scale) as f32);
-            let mut sum = 0.0;
-            over.push(0.0);
-            for pair in rows.windows(2) {
-                sum += 0.5 * dy * (pair[0] + pair[1]) * scale;
-                over.push(sum as f32);
-            }
-        }
-        Warp {
-            along: Grid {
-                width: w,
-                height: h,
-                values: along,
-            },
-            over: Grid {
-                width: 1,
-                height: h,
-                values: over,
-            },
-            density,
-        }
-    }
-
-    /// Where the point (x, y) comes from in the unit square.
-    fn invert(&self, slices: &[(usize, f64)], x: f64, y: f64) -> (f64, f64) {
-        let (w, h) = (self.density.width, self.density.height);
-        let ([a, b, c, d], (i, s), (j, t)) = self.density.corners(slices, x, y);
-        let mix = |p: f64, q: f64| p * (1.0 - t) + q * t;
-        let row = |i: usize| {
-            mix(
-                self.along.blend(slices, i, j),
-                self.along.blend(slices, i, (j + 1).min(h - 1)),
-            )
-        };
-        let (left, right) = (mix(a, c), mix(b, d));
-        let part = (left + 0.5 * (right - left) * s) * s / (w - 1) as f64;
-        let whole = row(w - 1);
-        let (low, high) = (
-            self.along.blend(slices, w - 1, j),
-            self.along.blend(slices, w - 1, (j + 1).min(h - 1)),
-        );
-        let below =
-            self.over.blend(slices, 0, j) + (low + 0.5 * (high - low) * t) * t / (h - 1) as f64;
-        let u = if whole > 0.0 {
-            (row(i) + part) / whole
-        } else {
-            x
-        };
-        (u.clamp(0.0, 1.0), below.clamp(0.0, 1.0))
-    }
-}
 
 /// One material.
 #[derive(Clone, Debug)]

@@ -78,7 +78,7 @@ pub fn decode_hdr(bytes: &[u8]) -> Result<Pixels> {
     let decoder = image::codecs::hdr::HdrDecoder::new(Cursor::new(bytes))
         .map_err(|e| anyhow!("it is no Radiance picture: {e}"))?;
     let (w, h) = decoder.dimensions();
-    let need = u64::from(w) * u64::from(h) * 12;
+    let need = (u64::from(w) * u64::from(h)).saturating_mul(12);
     ensure!(w > 0 && h > 0, "it has no pixels");
     ensure!(
         need <= LIMIT,

@@ -178,7 +178,7 @@ impl<'a> Pictures<'a> {
         self.read += bytes.len() as u64;
         let bytes = &plain(bytes).with_context(told)?;
         let (format, w, h) = measure(bytes).with_context(told)?;
-        self.count(u64::from(w) * u64::from(h) * 4)
+        self.count((u64::from(w) * u64::from(h)).saturating_mul(4))
             .with_context(told)?;
         let picture = Rc::new(decode(bytes, format, w, h).with_context(told)?);
         self.decoded.insert(image.index(), picture.clone());
@@ -197,7 +197,7 @@ pub fn decode_picture(bytes: &[u8]) -> Result<Pixels> {
     let bytes = &plain(bytes)?;
     let (format, w, h) = measure(bytes)?;
     ensure!(
-        u64::from(w) * u64::from(h) * 4 <= FREE + UNFOLDS * bytes.len() as u64,
+        (u64::from(w) * u64::from(h)).saturating_mul(4) <= FREE + UNFOLDS * bytes.len() as u64,
         "it claims {w} x {h} pixels in {} bytes; save it smaller",
         bytes.len()
     );
@@ -234,7 +234,11 @@ fn decode(bytes: &[u8], format: image::ImageFormat, w: u32, h: u32) -> Result<Pi
     let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
     // Room for 16-bit RGBA while decoding is the decoder's; what stays is 4 bytes a pixel.
     let mut limits = image::Limits::default();
-    limits.max_alloc = Some(u64::from(w) * u64::from(h) * 16 + (1 << 20));
+    limits.max_alloc = Some(
+        (u64::from(w) * u64::from(h))
+            .saturating_mul(16)
+            .saturating_add(1 << 20),
+    );
     reader.limits(limits);
     let picture = reader
         .decode()

@@ -82,6 +82,16 @@ impl Accumulation {
         }
     }
 
+    /// The mean radiance of every pixel.
+    pub(crate) fn means(&self) -> Vec<[f32; 3]> {
+        let n = self.samples.max(1) as f32;
+        let mean = |p: &PixelSum| {
+            let all = || p.direct.iter().chain(&p.indirect);
+            std::array::from_fn(|c| all().map(|l| l[c]).sum::<f32>() / n)
+        };
+        self.pixels.iter().map(mean).collect()
+    }
+
     /// The sums as bytes, for a checkpoint file.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {

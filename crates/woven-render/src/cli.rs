@@ -4,6 +4,7 @@ mod adapters;
 mod animate;
 mod compare;
 mod frame;
+mod oidn;
 mod progress;
 mod setup;
 
@@ -67,6 +68,12 @@ pub(crate) struct RenderArgs {
     /// Samples a pixel.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) spp: u32,
+    /// Stop as soon as the estimated noise (relMSE) is at most this; --spp is then the most. 0.001 looks clean.
+    #[arg(long, value_name = "RELMSE")]
+    pub(crate) noise: Option<f32>,
+    /// Stop after this many seconds (of each frame) with the samples gathered by then.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) time: Option<f64>,
     /// Most scattering events of a path; passing through a gap is none.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(0..=1024))]
     pub(crate) depth: u32,
@@ -104,13 +111,20 @@ pub(crate) struct RenderArgs {
     /// Haze of --sky: 2 very clear, 3 clear, 6 hazy.
     #[arg(long, value_name = "T", default_value_t = 3.0)]
     pub(crate) turbidity: f64,
+    /// Multiply the scene's own lamps and suns. Blender's exporter writes lumens: 0.00146 (1/683) makes watts of them.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub(crate) lamp_scale: f32,
     /// Use the camera of this name instead of the first.
     #[arg(long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
     /// Filter the noise of the picture, led by albedo, normal, depth and variance.
     #[arg(long)]
     pub(crate) denoise: bool,
-    /// Keep albedo, normal, depth, gap and variance as layers of the EXR.
+    /// Which denoiser --denoise means: our own, or the program oidnDenoise of Open Image Denoise; auto takes that where
+    /// it is installed.
+    #[arg(long, value_enum, default_value = "own")]
+    pub(crate) denoiser: DenoiserArg,
+    /// Keep albedo, normal, depth, gap, variance and (of an animation) motion as layers of the EXR.
     #[arg(long)]
     pub(crate) aov: bool,
     /// Keep one layer per light (sun, sky, lamps, other) in the EXR.
@@ -138,6 +152,17 @@ pub(crate) enum BackendArg {
     Cpu,
     /// A GPU or an error; takes a software one (lavapipe) too.
     Gpu,
+}
+
+/// `--denoiser`.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DenoiserArg {
+    /// Led by gap, normal, depth, albedo and variance.
+    Own,
+    /// Open Image Denoise, or an error.
+    Oidn,
+    /// Open Image Denoise where there is one.
+    Auto,
 }
 
 /// `--integrator`.

@@ -4,6 +4,7 @@ pub(crate) mod bvh;
 pub(crate) mod light;
 pub(crate) mod math;
 pub(crate) mod measured;
+pub(crate) mod motion;
 pub(crate) mod path;
 pub(crate) mod rect;
 pub(crate) mod share;

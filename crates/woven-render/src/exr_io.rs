@@ -14,6 +14,13 @@ use std::path::Path;
 /// Decoded samples of one file may take this many bytes unless told otherwise: 2 GiB.
 pub const DEFAULT_LIMIT: u64 = 2 << 30;
 
+/// A file may unfold to this many bytes however small it is ...
+const FREE: u64 = 256 << 20;
+/// ... and to this many more for each of its own bytes. Rendered light unfolds 2 to 10 times; a black picture a thousand times.
+const UNFOLDS: u64 = 64;
+/// Pictures of fewer pixels than this are decoded without starting threads for it.
+const SMALL: u64 = 1 << 18;
+
 /// A file holds at most this many channels.
 const MAX_CHANNELS: usize = 1024;
 
@@ -138,13 +145,21 @@ pub fn read_limited(path: &Path, limit: u64) -> Result<Film> {
 pub fn decode(bytes: &[u8], limit: u64) -> Result<Film> {
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false)
         .map_err(|e| anyhow!("not a whole OpenEXR file: {e}"))?;
-    check_headers(&meta.headers, limit)?;
-    let image = exr::image::read::read()
+    check_headers(
+        &meta.headers,
+        limit.min(FREE + UNFOLDS * bytes.len() as u64),
+    )?;
+    let small = |h: &Header| (h.layer_size.0 as u64) * (h.layer_size.1 as u64) < SMALL;
+    let mut reader = exr::image::read::read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .all_layers()
-        .all_attributes()
+        .all_attributes();
+    if meta.headers.iter().all(small) {
+        reader = reader.non_parallel();
+    }
+    let image = reader
         .from_buffered(Cursor::new(bytes))
         .map_err(|e| anyhow!("the OpenEXR data is broken: {e}"))?;
     let first = image
@@ -243,10 +258,10 @@ fn check_headers(headers: &[Header], limit: u64) -> Result<()> {
         );
         channels += header.channels.list.len();
         for channel in &header.channels.list {
-            // Decoded halves are widened to f32 here, so every sample counts at least 4 bytes.
+            // As stored, widened to f32, and once more in the film: a lone channel fills three numbers.
             let size = match channel.sample_type {
-                SampleType::F16 => 2 + 4,
-                SampleType::F32 | SampleType::U32 => 4 + 4,
+                SampleType::F16 => 2 + 4 + 4,
+                SampleType::F32 | SampleType::U32 => 4 + 4 + 4,
             };
             total = total.saturating_add(w.saturating_mul(h).saturating_mul(size));
         }

@@ -71,6 +71,8 @@ pub(crate) struct Gpu {
     load: u32,
     /// The longest submit so far.
     longest: Duration,
+    /// Submits so far.
+    submits: u64,
 }
 
 impl Gpu {
@@ -87,6 +89,7 @@ impl Gpu {
             height: view.height,
             load: 16,
             longest: Duration::ZERO,
+            submits: 0,
         })
     }
 
@@ -98,9 +101,14 @@ impl Gpu {
         self.samples
     }
 
-    /// The longest time that a single submit has taken.
-    pub(crate) fn longest(&self) -> Duration {
-        self.longest
+    /// The longest time that a single submit has taken, and how many there were.
+    pub(crate) fn longest(&self) -> (Duration, u64) {
+        (self.longest, self.submits)
+    }
+
+    /// Takes the device away. For tests.
+    pub(crate) fn lose(&self) {
+        self.context.device.lose();
     }
 
     /// Adds `count` samples to every pixel, in submits that are waited for after about [`AIM`].
@@ -175,6 +183,7 @@ impl Gpu {
     /// Sizes the next submit by the time of the last.
     fn adapt(&mut self, took: Duration, load: u32) {
         self.longest = self.longest.max(took);
+        self.submits += 1;
         let ratio = AIM.as_secs_f64() / took.as_secs_f64().max(1e-5);
         self.load = if took > LIMIT {
             (load / 2).max(1)

@@ -56,6 +56,8 @@ pub struct Settings {
     pub aov: bool,
     /// Stop after this time with the samples gathered by then (at least one a pixel).
     pub time_limit: Option<Duration>,
+    /// Stop when the estimated noise, relMSE = mean((x - r)²/(r² + 0.01)), is at most this; `spp` is then the most.
+    pub noise: Option<f32>,
 }
 
 impl Default for Settings {
@@ -70,6 +72,7 @@ impl Default for Settings {
             light_layers: false,
             aov: false,
             time_limit: None,
+            noise: None,
         }
     }
 }
@@ -113,6 +116,10 @@ pub struct Renderer {
     sums: Accumulation,
     engine: Engine,
     note: Option<String>,
+    /// Samples and means at the last power of two.
+    half: Option<(u32, Vec<[f32; 3]>)>,
+    /// The last estimate of the noise times the samples that it was made of.
+    noise: Option<f64>,
 }
 
 enum Engine {
@@ -162,6 +169,8 @@ impl Renderer {
             sums,
             engine,
             note,
+            half: None,
+            noise: None,
         })
     }
 
@@ -180,13 +189,35 @@ impl Renderer {
         self.note.as_deref()
     }
 
-    /// The longest time that one submit to the GPU has taken; nothing on the CPU.
+    /// The longest time that one submit to the GPU has taken, and how many submits there were; nothing on the CPU.
     #[must_use]
-    pub fn longest_submit(&self) -> Option<Duration> {
+    pub fn longest_submit(&self) -> Option<(Duration, u64)> {
         match &self.engine {
             Engine::Cpu => None,
             Engine::Gpu(gpu) => Some(gpu.longest()),
         }
+    }
+
+    /// Takes the GPU away, as the reset of a driver does; the next step has to find its way. For tests.
+    #[doc(hidden)]
+    pub fn lose_device(&self) {
+        if let Engine::Gpu(gpu) = &self.engine {
+            gpu.lose();
+        }
+    }
+
+    /// How far what each pixel sees has moved over the picture since `mesh` had the vertices `before`: to the right
+    /// and down, in pixels; 0 where nothing is seen or nothing has moved.
+    ///
+    /// # Errors
+    /// When the mesh is not there or has another number of vertices.
+    pub fn motion(&self, mesh: usize, before: &[Vec3]) -> Result<Vec<[f32; 3]>> {
+        cpu::motion::motion(
+            &self.table,
+            &view(&self.table, &self.settings),
+            mesh,
+            before,
+        )
     }
 
     /// The settings.
@@ -250,23 +281,46 @@ impl Renderer {
         Ok(())
     }
 
-    /// Goes on until all samples are gathered, the time is over, or the listener stops it.
+    /// Goes on until all samples are gathered, the time is over, the noise is low enough, or the listener stops it.
     ///
     /// # Errors
     /// As [`Self::step`], and when there is not a single sample.
     pub fn finish(&mut self, progress: &mut dyn Progress) -> Result<()> {
+        self.finish_keeping(progress, Duration::MAX, &mut |_| Ok(()))
+    }
+
+    /// [`Self::finish`], which hands the sums to `keep` now and then, so that a power cut costs no more than the time
+    /// `every`.
+    ///
+    /// # Errors
+    /// As [`Self::finish`], and what `keep` gives.
+    pub fn finish_keeping(
+        &mut self,
+        progress: &mut dyn Progress,
+        every: Duration,
+        keep: &mut dyn FnMut(&Accumulation) -> Result<()>,
+    ) -> Result<()> {
         let stop = progress.stop().unwrap_or_default();
         let start = Instant::now();
+        let mut kept = start;
         let pixels = u64::from(self.settings.width) * u64::from(self.settings.height);
-        let total = pixels * u64::from(self.settings.spp);
+        let mut goal = self.settings.spp;
         let mut count = 1;
-        while self.samples() < self.settings.spp {
-            let left = self.settings.spp - self.samples();
+        while self.samples() < goal {
+            let mut most = goal - self.samples();
+            if self.settings.noise.is_some() {
+                // The estimate looks at the powers of two.
+                most = most.min((self.samples() + 1).next_power_of_two() - self.samples());
+            }
             let began = Instant::now();
-            if !self.step(count.min(left), &stop)? {
+            let whole = self.step(count.min(most), &stop)?;
+            if !whole {
                 break;
             }
-            progress.advance(pixels * u64::from(self.samples()), total);
+            if let Some(limit) = self.settings.noise {
+                goal = self.goal(goal, limit)?;
+            }
+            progress.advance(pixels * u64::from(self.samples()), pixels * u64::from(goal));
             let took = began.elapsed().as_secs_f64();
             // Steps of about a third of a second: often enough to stop and to report, seldom enough to cost nothing.
             count =
@@ -282,12 +336,50 @@ impl Renderer {
             if stop.load(Ordering::Relaxed) {
                 break;
             }
+            if kept.elapsed() >= every && self.samples() < goal {
+                keep(self.sums()?)?;
+                kept = Instant::now();
+            }
         }
         ensure!(
             self.samples() > 0,
             "stopped before the first sample of each pixel; nothing was rendered"
         );
         Ok(())
+    }
+
+    /// The samples that bring the noise to `limit`, at most `spp`. At each power of two the two halves of the
+    /// samples are compared; the noise of their mean is a quarter of their squared difference, and it falls at least as 1/n.
+    fn goal(&mut self, goal: u32, limit: f32) -> Result<u32> {
+        let n = self.samples();
+        if !n.is_power_of_two() || n < 4 {
+            return Ok(goal);
+        }
+        self.read_back()?;
+        let now = self.sums.means();
+        let half = self.half.replace((n, now));
+        let Some((_, before)) = half.filter(|h| h.0 * 2 == n) else {
+            return Ok(goal);
+        };
+        let now = self.half.as_ref().map_or(&[][..], |h| &h.1);
+        let mut sum = 0.0;
+        for (m, a) in now.iter().flatten().zip(before.iter().flatten()) {
+            // The mean of the second half is 2 m - a, its distance from the first half's 2 (m - a).
+            sum += f64::from((m - a) * (m - a)) / f64::from(m * m + 0.01);
+        }
+        let noise = sum / (now.len() * 3).max(1) as f64;
+        self.noise = Some(noise * f64::from(n));
+        // Fewer than 16 samples say little about their own noise.
+        let wanted = (f64::from(n) * noise / f64::from(limit.max(1e-12)))
+            .ceil()
+            .min(1e9) as u32;
+        Ok(wanted.max(n).max(16).min(self.settings.spp))
+    }
+
+    /// The estimated relMSE of the picture so far; only with [`Settings::noise`], from the eighth sample on.
+    #[must_use]
+    pub fn noise(&self) -> Option<f64> {
+        Some(self.noise? / f64::from(self.samples().max(1)))
     }
 
     /// The picture so far.
@@ -298,6 +390,9 @@ impl Renderer {
         self.read_back()?;
         let mut film = self.sums.film(&self.settings);
         film.metadata.insert("device".into(), self.device());
+        if let Some(noise) = self.noise() {
+            film.metadata.insert("noise".into(), format!("{noise:.6}"));
+        }
         Ok(film)
     }
 
@@ -311,6 +406,14 @@ impl Renderer {
     }
 
     fn read_back(&mut self) -> Result<()> {
+        let Engine::Gpu(gpu) = &mut self.engine else {
+            return Ok(());
+        };
+        let Err(why) = gpu.read(&mut self.sums) else {
+            return Ok(());
+        };
+        let goal = gpu.samples();
+        self.recover(&why, goal, &AtomicBool::new(false))?;
         if let Engine::Gpu(gpu) = &mut self.engine {
             gpu.read(&mut self.sums)?;
         }
@@ -331,6 +434,7 @@ impl Renderer {
             self.settings.height
         );
         self.sums = sums;
+        (self.half, self.noise) = (None, None);
         if let Engine::Gpu(gpu) = &mut self.engine {
             gpu.restore(&self.sums)?;
         }

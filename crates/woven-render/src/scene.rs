@@ -48,6 +48,9 @@ pub struct Scene {
     pub portals: Vec<Portal>,
     /// The eye.
     pub camera: Camera,
+    /// Colours of vertices: the number of the mesh, and for each of its vertices a linear colour in 0..=1 that
+    /// multiplies the factors as a texture does.
+    pub colors: Vec<(usize, Vec<[f32; 3]>)>,
 }
 
 /// A triangle mesh in world space.
@@ -93,6 +96,9 @@ pub struct Material {
     pub emission: [f32; 3],
     /// Multiplies the factors `linear`.
     pub color_texture: Option<TextureUse>,
+    /// The reflection lobe keeps its colour where `color_texture` and coloured vertices multiply the other factors: the gloss of
+    /// everything that is no metal.
+    pub plain_gloss: bool,
     /// Its alpha channel multiplies the coverage by yarn: gap = 1 - a (1 - openness).
     pub coverage_texture: Option<TextureUse>,
     /// The alpha channel is the share that is woven as the sheet says instead, the rest being closed: gap = a openness.
@@ -102,6 +108,10 @@ pub struct Material {
     pub alpha_cutoff: Option<f32>,
     /// Multiplies `emission`.
     pub emission_texture: Option<TextureUse>,
+    /// Bends the shading normal: its colours are 2 c - 1 in the frame of u, minus v and the normal (glTF's convention).
+    pub normal_texture: Option<TextureUse>,
+    /// Multiplies the bending's first two numbers.
+    pub normal_scale: f32,
     /// Emits on both sides.
     pub double_sided: bool,
     /// Light layer of its emission, see [`LAYER_NAMES`].
@@ -333,10 +343,13 @@ impl Material {
             measured: None,
             emission: [0.0; 3],
             color_texture: None,
+            plain_gloss: false,
             coverage_texture: None,
             multiplies: false,
             alpha_cutoff: None,
             emission_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
             double_sided: false,
             layer: LAYER_LAMPS,
         }

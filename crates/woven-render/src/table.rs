@@ -6,6 +6,7 @@
 mod check;
 mod lights;
 mod material;
+mod mips;
 mod rows;
 mod sky;
 
@@ -106,6 +107,7 @@ impl Table {
             first,
         };
         table.fill_shade(None);
+        table.fill_colors(scene);
         table.fill_gaps();
         sky::fill(&mut table, scene, light_layers);
         lights::fill(&mut table, scene, light_layers);
@@ -120,6 +122,11 @@ impl Table {
     #[must_use]
     pub fn triangles(&self) -> usize {
         self.corners.len()
+    }
+
+    /// A mesh as it is now.
+    pub(crate) fn mesh(&self, mesh: usize) -> Option<&Mesh> {
+        self.meshes.get(mesh)
     }
 
     /// Moves the vertices of mesh `mesh`: refits the ray structure and renews normals and lights. `normals` may be
@@ -171,12 +178,32 @@ impl Table {
             if only.is_none_or(|o| o == m as usize) {
                 *row = Shade {
                     light: row.light,
+                    colors: row.colors,
                     mesh: m,
                     triangle: t,
                     ..shade_row(&meshes[m as usize], t as usize)
                 };
             }
         });
+    }
+
+    fn fill_colors(&mut self, scene: &Scene) {
+        if scene.colors.is_empty() {
+            return;
+        }
+        let byte = |v: f32| (crate::film::srgb_encode(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u32;
+        let packed = |c: &[f32; 3]| byte(c[0]) | byte(c[1]) << 8 | byte(c[2]) << 16 | 255 << 24;
+        let mut lists = vec![None; self.meshes.len()];
+        for (mesh, colors) in &scene.colors {
+            lists[*mesh] = Some(colors.iter().map(packed).collect::<Vec<_>>());
+        }
+        for shade in self.shade.iter_mut().filter(|s| s.material != NONE) {
+            if let Some(list) = &lists[shade.mesh as usize] {
+                let corners = self.meshes[shade.mesh as usize].indices[shade.triangle as usize];
+                let [a, b, c] = corners.map(|i| list[i as usize]);
+                shade.colors = [a, b, c, 1];
+            }
+        }
     }
 
     fn fill_gaps(&mut self) {
@@ -221,8 +248,15 @@ fn shade_row(mesh: &Mesh, t: usize) -> Shade {
         n0: n0.extend(t0.x).into(),
         n1: n1.extend(t1.x).into(),
         n2: n2.extend(t2.x).into(),
-        weft: weft.extend(0.0).into(),
-        v: [t0.y, t1.y, t2.y, 0.0],
+        // With v running down in the picture, a picture seen the right way round has a negative determinant.
+        weft: weft.extend(if det > 0.0 { -1.0 } else { 1.0 }).into(),
+        v: [
+            t0.y,
+            t1.y,
+            t2.y,
+            det.abs() / e1.cross(e2).length().max(1e-20),
+        ],
+        colors: [0; 4],
         material: mesh.material as u32,
         light: NONE,
         mesh: 0,

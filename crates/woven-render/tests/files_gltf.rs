@@ -308,3 +308,59 @@ fn a_moving_mesh_from_a_point_cache() {
         );
     }
 }
+
+#[test]
+fn bent_normals_second_coordinates_and_coloured_vertices() {
+    let (mut doc, mut bin) = scene();
+    // Another set of coordinates and colours of the vertices (bytes), at the end of the buffer.
+    bin.resize(bin.len().next_multiple_of(4), 0);
+    let (uv, colors) = (bin.len(), bin.len() + 32);
+    bin.extend([0.25_f32; 8].iter().flat_map(|x| x.to_le_bytes()));
+    bin.extend([255_u8, 0, 0, 255].repeat(4));
+    let views = doc["bufferViews"].as_array_mut().unwrap();
+    let first = views.len();
+    views.push(json!({ "buffer": 0, "byteOffset": uv, "byteLength": 32 }));
+    views.push(json!({ "buffer": 0, "byteOffset": colors, "byteLength": 16 }));
+    let list = doc["accessors"].as_array_mut().unwrap();
+    let n = list.len();
+    list.push(json!({ "bufferView": first, "componentType": 5126, "count": 4, "type": "VEC2" }));
+    list.push(json!({ "bufferView": first + 1, "componentType": 5121, "normalized": true, "count": 4, "type": "VEC4" }));
+    doc["buffers"][0]["byteLength"] = json!(bin.len());
+    let attributes = &mut doc["meshes"][0]["primitives"][0]["attributes"];
+    attributes["TEXCOORD_1"] = json!(n);
+    attributes["COLOR_0"] = json!(n + 1);
+    doc["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = json!(1);
+    doc["materials"][0]["normalTexture"] = json!({ "index": 0, "scale": 0.6, "texCoord": 1,
+        "extensions": { "KHR_texture_transform": { "offset": [-0.5, 0.5], "scale": [2, 3] } } });
+    let s = read(&doc, &bin).scene;
+    let cloth = s.meshes.iter().position(|m| !m.uvs.is_empty()).unwrap();
+    assert_eq!(s.meshes[cloth].uvs, [glam::Vec2::splat(0.25); 4]);
+    assert_eq!(s.colors, [(cloth, vec![[1.0, 0.0, 0.0]; 4])]);
+    let used = s.materials[0].normal_texture.unwrap();
+    assert_eq!(used.transform, [[2.0, 0.0, -0.5], [0.0, 3.0, 0.5]]);
+    assert_eq!(s.materials[0].normal_scale, 0.6);
+    // As a bend the picture is no colour: its numbers are not sRGB.
+    assert!(!s.textures[used.texture].srgb);
+}
+
+#[test]
+fn sheen_adds_its_colour_and_no_energy() {
+    let (mut doc, bin) = scene();
+    let mut with = |sheen: serde_json::Value| {
+        doc["materials"][0] = json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0 },
+            "extensions": { "KHR_materials_sheen": sheen } });
+        read(&doc, &bin).scene.materials[0].linear[2]
+    };
+    let plain = with(json!({}));
+    let velvet = with(json!({ "sheenColorFactor": [1.0, 0.2, 0.0], "sheenRoughnessFactor": 0.8 }));
+    // 0.42 r - 0.18 r² at r = 0.8 is 0.2208: of that the red sheen reflects all, the layer below what is left.
+    for (c, colour) in [1.0, 0.2, 0.0].into_iter().enumerate() {
+        let want = plain[c] * (1.0 - 0.2208) + 0.2208 * colour;
+        assert!(
+            (velvet[c] - want).abs() < 1e-5,
+            "{velvet:?}, not {want} in channel {c}"
+        );
+    }
+    let white = with(json!({ "sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 1 }));
+    assert!(white.iter().all(|c| *c < 1.0), "{white:?}");
+}

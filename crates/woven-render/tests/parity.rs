@@ -231,6 +231,81 @@ fn textures_and_lamps() {
     compare("textures and lamps", &scene, &settings(8), PIXELS, MEANS);
 }
 
+/// Textures far away, so that their smaller copies are used; bent normals, coloured vertices, a glow with a texture.
+#[test]
+fn small_copies_bent_normals_and_coloured_vertices() {
+    let mut scene = curtain_room(lace(), 60);
+    let speckle = |i: u32, n: u32| {
+        let k = i.wrapping_mul(2_654_435_761) >> 16;
+        [
+            (k & 255) as u8,
+            (k >> 3 & 255) as u8,
+            (n + k % 40) as u8,
+            255,
+        ]
+    };
+    for (name, srgb) in [("speckle", true), ("bumps", false)] {
+        scene.textures.push(Texture {
+            name: name.into(),
+            width: 64,
+            height: 48,
+            pixels: (0..64 * 48)
+                .map(|i| {
+                    if srgb {
+                        speckle(i, 90)
+                    } else {
+                        [(96 + i % 64) as u8, (150 - i / 64) as u8, 230, 255]
+                    }
+                })
+                .collect(),
+            srgb,
+            ..Texture::default()
+        });
+    }
+    let used = |texture: usize, n: f32| TextureUse {
+        texture,
+        transform: [[n, 0.2, 0.1], [-0.1, n, 0.0]],
+    };
+    scene.materials[0].color_texture = Some(used(0, 9.0));
+    scene.materials[1].normal_texture = Some(used(1, 3.0));
+    scene.materials[3].normal_texture = Some(used(1, 7.0));
+    scene.materials[3].normal_scale = 0.7;
+    scene.materials[3].color_texture = Some(used(0, 2.0));
+    scene.materials[3].plain_gloss = true;
+    let glow = scene.materials.len();
+    scene.materials.push(Material {
+        emission_texture: Some(used(0, 1.0)),
+        ..Material::lamp("glow", [0.8; 3], true)
+    });
+    scene.meshes.push(common::quad(
+        "glow",
+        Vec3::new(-1.9, 0.3, 0.6),
+        Vec3::Z * 0.8,
+        Vec3::Y * 0.6,
+        glow,
+    ));
+    for (i, mesh) in scene.meshes.iter().enumerate().take(2) {
+        let colour = |k: usize| {
+            [
+                [0.9, 0.4, 0.2],
+                [0.3, 0.8, 0.4],
+                [0.1, 0.2, 0.9],
+                [1.0, 1.0, 0.5],
+            ][k % 4]
+        };
+        scene
+            .colors
+            .push((i, (0..mesh.positions.len()).map(colour).collect()));
+    }
+    compare(
+        "small copies, bent normals",
+        &scene,
+        &settings(8),
+        PIXELS,
+        MEANS,
+    );
+}
+
 #[test]
 fn furnace_of_the_woven_sheet() {
     let mut scene = curtain_room(lace(), 40);

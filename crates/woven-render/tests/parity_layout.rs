@@ -50,7 +50,7 @@ fn rows_lie_where_the_shader_reads_them() {
     same!(m, Node, lo, hi, child);
     same!(m, Packet, v0, e1, e2, gap);
     same!(
-        m, Shade, n0, n1, n2, weft, v, material, light, mesh, triangle
+        m, Shade, n0, n1, n2, weft, v, colors, material, light, mesh, triangle
     );
     same!(
         m,
@@ -67,6 +67,8 @@ fn rows_lie_where_the_shader_reads_them() {
         alpha_cutoff,
         gap,
         cover,
+        normal_texture,
+        normal_scale,
         measured,
         unused
     );
@@ -87,7 +89,9 @@ fn rows_lie_where_the_shader_reads_them() {
         sky_layer,
         soft_lights,
         offset,
-        taps
+        taps,
+        others,
+        spare
     );
     same!(
         m, Frame, eye, aperture, right, focus, up, width, forward, height, lens_x, depth, lens_y,

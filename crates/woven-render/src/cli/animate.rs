@@ -82,6 +82,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
     std::fs::create_dir_all(&args.output)
         .with_context(|| format!("cannot make the folder {}", args.output.display()))?;
     let ledger_path = args.output.join("frames.json");
+    tidy(&args.output);
     setup::check_writable(&ledger_path)?;
     let mut job = setup::prepare(&args.scene, &args.render)?;
     let cache = motion::open(&args.cloth, &Limits::default())?;
@@ -132,6 +133,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
     let started = Instant::now();
     let mut renderer = Renderer::new(&job.scene, &job.settings, job.backend)?;
     let mut frame: Mesh = job.scene.meshes[moving].clone();
+    let mut before: Mesh = frame.clone();
     for (done, &k) in todo.iter().enumerate() {
         let left = left(started, done, todo.len());
         bar.word(&format!("frame {k} ({} of {}{left})", done + 1, todo.len()));
@@ -148,7 +150,12 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
         }
         let hash = frame_hash(&job.hash, &cache.hash, &frame.name, k);
         let mut film = renderer.film()?;
-        setup::finish(&mut film, &args.render, &job.metadata, &hash);
+        if args.render.aov {
+            // From the frame before in the cache, whether this run has rendered it or not.
+            cache.apply(k.saturating_sub(1), &mut before)?;
+            film.push("motion", renderer.motion(moving, &before.positions)?);
+        }
+        setup::finish(&mut film, &args.render, &job.metadata, &hash)?;
         film.metadata.insert("frame".to_owned(), k.to_string());
         let name = file_name(k, &args.format);
         setup::write(
@@ -165,13 +172,25 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
         bar.say(&format!("note: {note}"));
     }
     eprintln!(
-        "{} frames in {:.1} s on {} ({:.2} s a frame)",
+        "{} frames in {:.1} s on {} ({:.2} s a frame){}",
         todo.len(),
         started.elapsed().as_secs_f64(),
         renderer.device(),
-        started.elapsed().as_secs_f64() / todo.len() as f64
+        started.elapsed().as_secs_f64() / todo.len() as f64,
+        setup::log(&renderer)
     );
     Ok(())
+}
+
+/// Takes away what a run that was killed in the middle of writing has left.
+fn tidy(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(".woven-") && name.ends_with(".part") {
+            std::fs::remove_file(entry.path()).ok();
+        }
+    }
 }
 
 fn left(started: Instant, done: usize, of: usize) -> String {

@@ -9,6 +9,9 @@ use woven_render::accumulate::Accumulation;
 use woven_render::atomic::write_atomically;
 use woven_render::render::Renderer;
 
+/// A power cut costs at most this much work.
+const KEEP: Duration = Duration::from_secs(60);
+
 /// Render one picture of a glTF scene.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Examples:
@@ -16,16 +19,13 @@ use woven_render::render::Renderer;
   woven-render frame room.glb -o room.png --spp 16 --denoise --exposure 1
   woven-render frame room.glb -o noon.exr --sky 2026-06-21T12:00+02:00 --place 52.52,13.40 --light-layers --aov
 
-Stopped by Ctrl-C it keeps what it has in OUT.checkpoint; the same command goes on from there.")]
+Once a minute, and when stopped by Ctrl-C, it keeps what it has in OUT.checkpoint; the same command goes on from there.")]
 pub(crate) struct FrameArgs {
     /// The scene, .glb or .gltf.
     scene: PathBuf,
     /// The picture to write, .exr or .png.
     #[arg(short, long, value_name = "OUT.exr")]
     output: PathBuf,
-    /// Stop after this many seconds with the samples gathered by then.
-    #[arg(long, value_name = "SECONDS")]
-    time: Option<f64>,
     #[command(flatten)]
     render: RenderArgs,
 }
@@ -34,13 +34,7 @@ pub(crate) struct FrameArgs {
 pub(crate) fn run(args: &FrameArgs) -> Result<()> {
     setup::kind(&args.output)?;
     setup::check_writable(&args.output)?;
-    let mut job = setup::prepare(&args.scene, &args.render)?;
-    if let Some(seconds) = args.time {
-        job.settings.time_limit = Some(
-            Duration::try_from_secs_f64(seconds)
-                .map_err(|_| anyhow::anyhow!("--time {seconds} is no time in seconds"))?,
-        );
-    }
+    let job = setup::prepare(&args.scene, &args.render)?;
     let mut bar = Bar::new("rendering", stop_flag()?);
     let started = Instant::now();
     let mut renderer = Renderer::new(&job.scene, &job.settings, job.backend)?;
@@ -51,7 +45,9 @@ pub(crate) fn run(args: &FrameArgs) -> Result<()> {
         eprintln!("going on from {} samples a pixel", sums.samples);
         renderer.resume(sums)?;
     }
-    renderer.finish(&mut bar)?;
+    renderer.finish_keeping(&mut bar, KEEP, &mut |sums| {
+        write_checkpoint(&checkpoint, &key, sums)
+    })?;
     bar.finish();
     if let Some(note) = renderer.note() {
         eprintln!("note: {note}");
@@ -68,13 +64,14 @@ pub(crate) fn run(args: &FrameArgs) -> Result<()> {
     }
     let (samples, device) = (renderer.samples(), renderer.device());
     let mut film = renderer.film()?;
-    setup::finish(&mut film, &args.render, &job.metadata, &job.hash);
+    setup::finish(&mut film, &args.render, &job.metadata, &job.hash)?;
     setup::write(&film, &args.output, &args.render, job.scene.camera.exposure)?;
     std::fs::remove_file(&checkpoint).ok();
     eprintln!(
-        "{}: {samples} samples a pixel in {:.2} s on {device}",
+        "{}: {samples} samples a pixel in {:.2} s on {device}{}",
         args.output.display(),
-        started.elapsed().as_secs_f64()
+        started.elapsed().as_secs_f64(),
+        setup::log(&renderer)
     );
     Ok(())
 }

@@ -1,13 +1,13 @@
 //! From the arguments to a scene, settings and the hash that tells whether two runs make the same picture.
 
-use super::{BackendArg, CurveArg, IntegratorArg, RenderArgs};
+use super::{BackendArg, CurveArg, DenoiserArg, IntegratorArg, RenderArgs, oidn};
 use anyhow::{Context, Result, ensure};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::Path;
 use woven_render::film::{Curve, Film};
-use woven_render::render::{Backend, Integrator, Settings};
-use woven_render::scene::{Scene, environment, gltf, sky};
+use woven_render::render::{Backend, Integrator, Renderer, Settings};
+use woven_render::scene::{Light, Scene, environment, gltf, sky};
 use woven_render::{denoise, exr_io};
 
 /// A scene ready to be rendered.
@@ -47,6 +47,23 @@ pub(crate) fn prepare(scene_path: &Path, args: &RenderArgs) -> Result<Job> {
         "--env-scale {} is no factor; give a number from 0 up",
         args.env_scale
     );
+    ensure!(
+        args.lamp_scale.is_finite() && args.lamp_scale >= 0.0,
+        "--lamp-scale {} is no factor; give a number from 0 up",
+        args.lamp_scale
+    );
+    for light in &mut scene.lights {
+        let (Light::Sun {
+            irradiance: power, ..
+        }
+        | Light::Point {
+            intensity: power, ..
+        }
+        | Light::Spot {
+            intensity: power, ..
+        }) = light;
+        *power = power.map(|p| p * args.lamp_scale);
+    }
     ensure!(
         args.env_turn.is_finite() && args.exposure.is_finite(),
         "--env-turn and --exposure must be finite numbers"
@@ -93,8 +110,20 @@ pub(crate) fn prepare(scene_path: &Path, args: &RenderArgs) -> Result<Job> {
         light_layers: args.light_layers,
         // The denoiser is led by them.
         aov: args.aov || args.denoise,
-        time_limit: None,
+        time_limit: args
+            .time
+            .map(|seconds| {
+                std::time::Duration::try_from_secs_f64(seconds)
+                    .map_err(|_| anyhow::anyhow!("--time {seconds} is no time in seconds"))
+            })
+            .transpose()?,
+        noise: args.noise,
     };
+    ensure!(
+        args.noise.is_none_or(|n| n > 0.0),
+        "--noise {} cannot be reached; give a relMSE above 0, such as 0.001",
+        args.noise.unwrap_or(0.0)
+    );
     let backend = match args.backend {
         BackendArg::Auto => Backend::Auto,
         BackendArg::Cpu => Backend::Cpu,
@@ -110,6 +139,8 @@ pub(crate) fn prepare(scene_path: &Path, args: &RenderArgs) -> Result<Job> {
         &args.camera,
         args.denoise,
         args.aov,
+        args.denoiser,
+        args.lamp_scale,
     );
     hasher.update(format!(
         "{} {settings:?} {backend:?} {metadata:?} {view:?}",
@@ -136,16 +167,34 @@ fn file_hash(path: &Path) -> Result<String> {
 }
 
 /// What a finished film goes through before it is written: denoising, leaving out helper layers, metadata.
+///
+/// # Errors
+/// When Open Image Denoise is asked for and does not do its work.
 pub(crate) fn finish(
     film: &mut Film,
     args: &RenderArgs,
     metadata: &BTreeMap<String, String>,
     hash: &str,
-) {
+) -> Result<()> {
     if args.denoise {
-        denoise::denoise(film, &denoise::Settings::default());
-        film.metadata
-            .insert("denoised".to_owned(), "yes".to_owned());
+        let program = match args.denoiser {
+            DenoiserArg::Own => None,
+            DenoiserArg::Auto => oidn::found(),
+            DenoiserArg::Oidn => Some(oidn::found().context(
+                "the program oidnDenoise is not in the PATH; install Open Image Denoise or leave --denoiser out",
+            )?),
+        };
+        let how = match program {
+            Some(program) => {
+                oidn::denoise(&program, film)?;
+                "Open Image Denoise"
+            }
+            None => {
+                denoise::denoise(film, &denoise::Settings::default());
+                "yes"
+            }
+        };
+        film.metadata.insert("denoised".to_owned(), how.to_owned());
     }
     if !args.aov {
         film.layers
@@ -154,6 +203,22 @@ pub(crate) fn finish(
     film.metadata.extend(metadata.clone());
     film.metadata
         .insert("settings.sha256".to_owned(), hash.to_owned());
+    Ok(())
+}
+
+/// What the renderer has to tell at the end: the submits to the GPU and the noise that is left.
+pub(crate) fn log(renderer: &Renderer) -> String {
+    let mut out = String::new();
+    if let Some((longest, submits)) = renderer.longest_submit() {
+        out += &format!(
+            "; {submits} submits, the longest {:.0} ms",
+            longest.as_secs_f64() * 1e3
+        );
+    }
+    if let Some(noise) = renderer.noise() {
+        out += &format!("; relMSE about {noise:.5}");
+    }
+    out
 }
 
 /// Kinds of output by the file's ending.

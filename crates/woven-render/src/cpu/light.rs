@@ -486,7 +486,7 @@ fn sky_density(table: &Table, at: &Place, d: Vec3) -> f32 {
 
 /// Radiance of sun discs in direction `d`, by layer, for rays that look straight at them.
 pub(crate) fn discs(table: &Table, d: Vec3, mut add: impl FnMut(u32, Vec3)) {
-    for r in &table.lights[..table.globals.lights as usize] {
+    for r in &table.lights[table.globals.others as usize..table.globals.lights as usize] {
         if r.kind == SUN && r.u[1] > 1e-4 && d.dot(Vec3::from(r.n)) > r.u[0] {
             // Solid angle of the disc: the projected one, as it is sampled.
             add(

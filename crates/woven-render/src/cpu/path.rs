@@ -1,9 +1,10 @@
 //! One sample of one pixel. The pair of `shader/path.wgsl`.
 //!
 //! A camera ray goes straight on through every sheet it meets. At each crossing the light that the sheet scatters
-//! towards the eye is estimated with weight (product of the gaps before it); only the indirect part is taken at one
-//! crossing, chosen in proportion to what the crossings contribute. So the view through the cloth is as clean as
-//! without it, and there is no coin in the picture of the cloth itself.
+//! towards the eye is estimated with weight (product of the gaps before it). Indirect light is gathered at the first
+//! crossing and at one of those behind; the path that finds it begins at one of the two, chosen in proportion to what
+//! the crossings contribute. So the view through the cloth is as clean as without it, and there is no coin in the
+//! picture of the cloth itself.
 
 use glam::Vec3;
 
@@ -67,7 +68,19 @@ pub(super) struct Vertex {
     pub s: Surface,
     at: Place,
     pub wo: Vec3,
+    /// What is scattered here reaches the eye times this.
     pub throughput: Vec3,
+}
+
+/// Where a camera ray is scattered: its first sheet, and one of those behind for all of them.
+pub(super) const FIRSTS: usize = 2;
+
+/// A point at which a camera ray is scattered.
+#[derive(Clone, Copy)]
+pub(super) struct First {
+    pub vertex: Vertex,
+    /// Probability with which the pixel's path begins here.
+    pub share: f32,
 }
 
 /// The second point of a path, and the light that it scatters on: what the pixels of a group share.
@@ -88,7 +101,9 @@ pub(super) struct Second {
 pub(super) struct Begun {
     pub sample: Sample,
     /// Where the camera ray is scattered.
-    pub first: Option<Vertex>,
+    pub firsts: [Option<First>; FIRSTS],
+    /// At which of them the path begins.
+    pub chosen: usize,
     pub second: Option<Second>,
 }
 
@@ -201,9 +216,9 @@ pub(super) fn begin(
     let ray = camera_ray(view, x, y, rng.set(0));
     let mut passed = 1.0_f32;
     let mut tmin = 0.0;
-    let mut chosen: Option<Vertex> = None;
-    let mut chosen_weight = 0.0;
-    let mut all_weights = 0.0;
+    let mut found: [Option<Vertex>; FIRSTS] = [None; FIRSTS];
+    // Weight of the first, and of the rest with that of the one that stands for them.
+    let (mut front, mut rest, mut kept) = (0.0, 0.0, 0.0);
     let mut pick = rng.coin();
     for crossing in 0..CROSSINGS {
         let Some(hit) = nearest(table, &ray, tmin, FAR) else {
@@ -217,7 +232,7 @@ pub(super) fn begin(
             });
             break;
         };
-        let s = surface::surface(table, &hit);
+        let s = surface::surface(table, &hit, hit.t * view.up.length() / view.height as f32);
         let m = &table.materials[s.material as usize];
         let wo = s.local(-ray.d);
         let gap = surface::gap(table, m, &s, ray.d);
@@ -239,20 +254,26 @@ pub(super) fn begin(
             if let Some((l, value)) = incident(table, m, &s, &at, wo, u, &mut rng) {
                 add(&mut out.direct, l.layer, value * passed);
             }
-            // Reservoir of one: each crossing is kept in proportion to its weight.
-            all_weights += weight;
-            let keep = weight / all_weights;
-            if pick < keep {
-                pick /= keep;
-                chosen = Some(Vertex {
-                    s,
-                    at,
-                    wo,
-                    throughput: Vec3::splat(passed),
-                });
-                chosen_weight = weight;
+            let vertex = Vertex {
+                s,
+                at,
+                wo,
+                throughput: Vec3::splat(passed),
+            };
+            if found[0].is_none() {
+                found[0] = Some(vertex);
+                front = weight;
             } else {
-                pick = (pick - keep) / (1.0 - keep);
+                // Reservoir of one: each crossing is kept in proportion to its weight.
+                rest += weight;
+                let keep = weight / rest;
+                if pick < keep {
+                    pick /= keep;
+                    found[1] = Some(vertex);
+                    kept = weight;
+                } else {
+                    pick = (pick - keep) / (1.0 - keep);
+                }
             }
         }
         passed *= gap;
@@ -269,14 +290,27 @@ pub(super) fn begin(
         }
         tmin = hit.t * (1.0 + 2e-6) + table.globals.offset;
     }
-    let mut second = None;
-    if let Some(v) = &mut chosen {
-        v.throughput *= all_weights / chosen_weight;
-        second = follow(table, view, v, paths, &mut out);
+    if let Some(v) = &mut found[1] {
+        v.throughput *= rest / kept;
     }
+    let share = front / (front + rest).max(1e-30);
+    let shares = [share, 1.0 - share];
+    let chosen = usize::from(pick >= share && found[1].is_some());
+    let mut second = None;
+    if let Some(mut v) = found[chosen] {
+        v.throughput /= shares[chosen];
+        second = follow(table, view, &v, paths, &mut out);
+    }
+    let first = |i: usize| {
+        found[i].map(|vertex| First {
+            vertex,
+            share: shares[i],
+        })
+    };
     Begun {
         sample: out,
-        first: chosen,
+        firsts: [first(0), first(1)],
+        chosen,
         second,
     }
 }
@@ -369,7 +403,7 @@ fn follow(
                 }
                 return second;
             };
-            let s = surface::surface(table, &hit);
+            let s = surface::surface(table, &hit, 0.0);
             let gap = surface::gap(table, &table.materials[s.material as usize], &s, d);
             if gap <= 0.0 || (gap < 1.0 && rng.coin() >= gap) {
                 break (hit, s, gap);

@@ -13,7 +13,7 @@ use glam::Vec3;
 
 use super::bvh::{Ray, transmittance_exact};
 use super::math::luminance;
-use super::path::{self, Begun, Sample, Second, Vertex, View};
+use super::path::{self, Begun, FIRSTS, First, Sample, Second, View};
 use super::surface;
 use crate::rng::{Rng, hash, hash2};
 use crate::table::Table;
@@ -97,30 +97,34 @@ fn gather(table: &Table, group: &mut [Option<Begun>; GROUP], coins: &[f32; GROUP
         let Some(begun) = group[i].as_ref().filter(|_| coins[i] < q) else {
             continue;
         };
-        let (Some(own), Some(y)) = (begun.first, begun.second) else {
+        let (Some(own), Some(y)) = (begun.firsts[begun.chosen], begun.second) else {
             continue;
         };
-        let side = y.s.ng.dot(y.s.p - own.s.p) < 0.0;
+        let chosen = begun.chosen;
+        let side = y.s.ng.dot(y.s.p - own.vertex.s.p) < 0.0;
         let mut all = 0.0;
-        let mut sights = [Sight::default(); GROUP];
-        for (k, sight) in sights.iter_mut().enumerate() {
-            if let Some(x) = group[k].as_ref().and_then(|b| b.first.as_ref()) {
-                *sight = look(table, x, &y, side, k == i);
-                all += sight.density;
+        let mut sights = [[Sight::default(); FIRSTS]; GROUP];
+        for (k, sights) in sights.iter_mut().enumerate() {
+            let Some(begun) = &group[k] else { continue };
+            for (which, (sight, first)) in sights.iter_mut().zip(&begun.firsts).enumerate() {
+                if let Some(first) = first {
+                    *sight = look(table, first, &y, side, (k, which) == (i, chosen));
+                    all += sight.density;
+                }
             }
         }
         let m = &table.materials[y.s.material as usize];
-        for (sight, begun) in sights.iter().zip(group.iter_mut()) {
-            let (true, Some(b)) = (sight.density > 0.0, begun.as_mut()) else {
-                continue;
-            };
-            let carry = sight.carry * (1.0 / (q * all));
-            let wo = y.s.local(-sight.d);
-            let light = &mut b.sample.indirect;
-            light[y.lit.layer as usize] += y.lit.scattered(table, m, &y.s, wo) * carry;
-            let f = surface::evaluate(table, m, &y.s, y.s.local(y.wi), wo) * carry;
-            for (sum, &beyond) in light.iter_mut().zip(&y.beyond) {
-                *sum += f * beyond;
+        for (sights, begun) in sights.iter().zip(group.iter_mut()) {
+            let Some(begun) = begun else { continue };
+            for sight in sights.iter().filter(|s| s.density > 0.0) {
+                let carry = sight.carry * (1.0 / (q * all));
+                let wo = y.s.local(-sight.d);
+                let light = &mut begun.sample.indirect;
+                light[y.lit.layer as usize] += y.lit.scattered(table, m, &y.s, wo) * carry;
+                let f = surface::evaluate(table, m, &y.s, y.s.local(y.wi), wo) * carry;
+                for (sum, &beyond) in light.iter_mut().zip(&y.beyond) {
+                    *sum += f * beyond;
+                }
             }
         }
     }
@@ -133,7 +137,8 @@ fn brightness(table: &Table, y: &Second) -> f32 {
     if l.is_finite() { l } else { 0.0 }
 }
 
-fn look(table: &Table, x: &Vertex, y: &Second, side: bool, own: bool) -> Sight {
+fn look(table: &Table, first: &First, y: &Second, side: bool, own: bool) -> Sight {
+    let x = &first.vertex;
     let from = x.s.leave(table, y.s.p - x.s.p);
     let to = y.s.p - from;
     let distance2 = to.length_squared().max(1e-12);
@@ -146,7 +151,7 @@ fn look(table: &Table, x: &Vertex, y: &Second, side: bool, own: bool) -> Sight {
     let m = &table.materials[x.s.material as usize];
     let wi = x.s.local(d);
     let yarn = 1.0 - surface::gap(table, &table.materials[y.s.material as usize], &y.s, d);
-    let density = surface::density(table, m, x.wo, wi) * yarn;
+    let density = first.share * surface::density(table, m, x.wo, wi) * yarn;
     if density <= 0.0 {
         return Sight::default();
     }

@@ -10,7 +10,8 @@ use crate::optics;
 use woven_bsdf::sheet::shape::{GAMMA_WARP, INV_MEAN_COVER};
 
 use crate::table::{
-    DOUBLE_SIDED, EMITS, EVEN, MATT, MEASURED, MULTIPLIES, MaterialRow, NONE, Table, TextureRow,
+    DOUBLE_SIDED, EMITS, EVEN, MATT, MEASURED, MULTIPLIES, MaterialRow, NONE, PLAIN_GLOSS, Table,
+    TextureRow,
 };
 
 /// A point of a sheet, seen along a ray.
@@ -101,8 +102,26 @@ fn uv_at(table: &Table, place: usize, u: f32, v: f32) -> [f32; 2] {
     ]
 }
 
-/// Everything about the hit that scattering needs.
-pub(crate) fn surface(table: &Table, hit: &Hit) -> Surface {
+/// The frame turned to the normal that the texture's colour means, see [`crate::scene::Material::normal_texture`].
+#[inline(always)]
+fn bent([x, y, z]: [Vec3; 3], hand: f32, scale: f32, c: [f32; 4]) -> [Vec3; 3] {
+    let across = (c[0] * 2.0 - 1.0) * scale;
+    let up = (c[1] * 2.0 - 1.0) * scale * hand;
+    // Never turned to the other side.
+    let out = (c[2] * 2.0 - 1.0).max(0.05);
+    let n = (x * across + y * up + z * out).normalize();
+    let along = x - n * x.dot(n);
+    let length = along.length();
+    let weft = if length > 1e-4 {
+        along * (1.0 / length)
+    } else {
+        any_tangent(n)
+    };
+    [weft, n.cross(weft), n]
+}
+
+/// Everything about the hit that scattering needs; textures are averaged over a square of side `wide` \[m\].
+pub(crate) fn surface(table: &Table, hit: &Hit, wide: f32) -> Surface {
     let place = hit.place as usize;
     let packet = &table.bvh.packets[place / 4];
     let lane = place % 4;
@@ -114,21 +133,35 @@ pub(crate) fn surface(table: &Table, hit: &Hit) -> Surface {
     let mut tint = Vec3::ONE;
     let mut alpha = 1.0;
     let mut uv = [0.0; 2];
+    let mut turned = frame(table, place, hit.u, hit.v, ng);
     if material.color_texture != NONE
         || material.coverage_texture != NONE
         || material.emission_texture != NONE
+        || material.normal_texture != NONE
     {
         uv = uv_at(table, place, hit.u, hit.v);
+        let area = wide * wide * s.v[3];
         if material.color_texture != NONE {
-            let c = texel(table, material.color_texture, uv);
+            let c = texel(table, material.color_texture, uv, area);
             tint = Vec3::new(c[0], c[1], c[2]);
         }
-        alpha = coverage(table, material, uv);
+        if material.normal_texture != NONE {
+            let c = texel(table, material.normal_texture, uv, area);
+            turned = bent(turned, s.weft[3], material.normal_scale, c);
+        }
+        alpha = coverage(table, material, uv, area);
+    }
+    if s.colors[3] != 0 {
+        let c = |k: usize| {
+            let c = decode(s.colors[k], true);
+            Vec3::new(c[0], c[1], c[2])
+        };
+        tint *= c(0) * (1.0 - hit.u - hit.v) + c(1) * hit.u + c(2) * hit.v;
     }
     Surface {
         p: v0 + e1 * hit.u + e2 * hit.v,
         ng,
-        frame: frame(table, place, hit.u, hit.v, ng),
+        frame: turned,
         uv,
         material: s.material,
         light: s.light,
@@ -172,7 +205,7 @@ pub(crate) fn gap_at(table: &Table, place: u32, u: f32, v: f32, d: Vec3) -> f32 
     let material = &table.materials[table.shade[place].material as usize];
     let mut alpha = 1.0;
     if material.coverage_texture != NONE {
-        alpha = coverage(table, material, uv_at(table, place, u, v));
+        alpha = coverage(table, material, uv_at(table, place, u, v), 0.0);
         if alpha <= 0.0 {
             return covered(material, 0.0, 1.0);
         }
@@ -190,11 +223,11 @@ pub(crate) fn gap_at(table: &Table, place: u32, u: f32, v: f32, d: Vec3) -> f32 
 }
 
 /// Coverage by the texture's alpha.
-fn coverage(table: &Table, material: &MaterialRow, uv: [f32; 2]) -> f32 {
+fn coverage(table: &Table, material: &MaterialRow, uv: [f32; 2], area: f32) -> f32 {
     if material.coverage_texture == NONE {
         return 1.0;
     }
-    let alpha = texel(table, material.coverage_texture, uv)[3];
+    let alpha = texel(table, material.coverage_texture, uv, area)[3];
     if material.alpha_cutoff < 0.0 {
         alpha
     } else if alpha < material.alpha_cutoff {
@@ -204,19 +237,46 @@ fn coverage(table: &Table, material: &MaterialRow, uv: [f32; 2]) -> f32 {
     }
 }
 
-/// Linear RGBA of a texture at the mesh's coordinates, bilinear.
-fn texel(table: &Table, row: u32, uv: [f32; 2]) -> [f32; 4] {
+/// Linear RGBA of a texture at the mesh's coordinates, bilinear; averaged over the area `area` of (u, v): trilinear
+/// between the copies whose texels are just smaller and just larger.
+fn texel(table: &Table, row: u32, uv: [f32; 2], area: f32) -> [f32; 4] {
     let t = &table.textures[row as usize];
-    let x = (t.map_u[0] * uv[0] + t.map_u[1] * uv[1] + t.map_u[2]) * t.width as f32 - 0.5;
-    let y = (t.map_v[0] * uv[0] + t.map_v[1] * uv[1] + t.map_v[2]) * t.height as f32 - 0.5;
+    // Half the logarithm of the texels in the area.
+    let level = (0.5 * (area * t.map_u[3]).max(1.0).log2()).min(t.map_v[3]);
+    let below = level.floor();
+    let mut low = [0.0; 4];
+    let (mut first, mut w, mut h) = (t.first, t.width, t.height);
+    for k in 0..=t.map_v[3] as u32 {
+        if k as f32 >= below {
+            let c = taps(table, t, [first, w, h], uv);
+            if k as f32 > below {
+                let mix = level - below;
+                return std::array::from_fn(|i| low[i] + (c[i] - low[i]) * mix);
+            }
+            low = c;
+            if level <= below {
+                break;
+            }
+        }
+        first += w * h;
+        (w, h) = ((w / 2).max(1), (h / 2).max(1));
+    }
+    low
+}
+
+/// Bilinear in the copy that begins at texel `first` and has `w` by `h`.
+#[inline(always)]
+fn taps(table: &Table, t: &TextureRow, [first, w, h]: [u32; 3], uv: [f32; 2]) -> [f32; 4] {
+    let x = (t.map_u[0] * uv[0] + t.map_u[1] * uv[1] + t.map_u[2]) * w as f32 - 0.5;
+    let y = (t.map_v[0] * uv[0] + t.map_v[1] * uv[1] + t.map_v[2]) * h as f32 - 0.5;
     let (x0, y0) = (x.floor(), y.floor());
     let (fx, fy) = (x - x0, y - y0);
     let at = |dx: i32, dy: i32| {
-        let i = wrapped(x0 as i32 + dx, t.width as i32, t.flags & 3);
-        let j = wrapped(y0 as i32 + dy, t.height as i32, (t.flags >> 2) & 3);
+        let i = wrapped(x0 as i32 + dx, w as i32, t.flags & 3);
+        let j = wrapped(y0 as i32 + dy, h as i32, (t.flags >> 2) & 3);
         decode(
-            table.texels[(t.first as i32 + j * t.width as i32 + i) as usize],
-            t,
+            table.texels[(first as i32 + j * w as i32 + i) as usize],
+            t.flags & 16 != 0,
         )
     };
     let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
@@ -238,9 +298,9 @@ fn wrapped(i: i32, n: i32, mode: u32) -> i32 {
     }
 }
 
-fn decode(texel: u32, t: &TextureRow) -> [f32; 4] {
+fn decode(texel: u32, srgb: bool) -> [f32; 4] {
     let c: [f32; 4] = std::array::from_fn(|k| ((texel >> (8 * k)) & 255) as f32 * (1.0 / 255.0));
-    if t.flags & 16 == 0 {
+    if !srgb {
         return c;
     }
     let linear = |k: u32| SRGB[((texel >> (8 * k)) & 255) as usize];
@@ -272,7 +332,7 @@ pub(crate) fn emission(table: &Table, material: &MaterialRow, s: &Surface, wo: V
     if material.emission_texture == NONE {
         return e;
     }
-    let c = texel(table, material.emission_texture, s.uv);
+    let c = texel(table, material.emission_texture, s.uv, 0.0);
     e * Vec3::new(c[0], c[1], c[2])
 }
 
@@ -291,6 +351,7 @@ pub(crate) fn emission_at(table: &Table, place: u32, u: f32, v: f32) -> Vec3 {
         table,
         material.emission_texture,
         uv_at(table, place as usize, u, v),
+        0.0,
     );
     e * Vec3::new(c[0], c[1], c[2])
 }
@@ -314,15 +375,19 @@ pub(crate) fn evaluate(table: &Table, m: &MaterialRow, s: &Surface, wi: Vec3, wo
     if m.flags & MEASURED != 0 {
         return scale * measured::evaluate(table, m.measured, wi, wo);
     }
-    let value = |shape: &[f32; crate::scene::MAX_SHAPE]| {
+    let plain = m.flags & PLAIN_GLOSS != 0;
+    let value = |shape: &[f32; crate::scene::MAX_SHAPE], share: f32| {
         let b = optics::sheet_basis(shape, wi, wo);
-        k(0) * b[0] + k(1) * b[1] + k(2 + back) * b[2] + k(3 + back) * b[3] + k(4 + back) * b[4]
+        let scale = s.tint * share;
+        let gloss = if plain { Vec3::splat(share) } else { scale };
+        (k(0) * b[0] + k(1) * b[1] + k(2 + back) * b[2] + k(4 + back) * b[4]) * scale
+            + k(3 + back) * b[3] * gloss
     };
-    let woven = value(&m.shape) * scale;
+    let woven = value(&m.shape, s.alpha);
     if m.flags & MULTIPLIES == 0 {
         return woven;
     }
-    woven + value(&closed(m.shape)) * (s.tint * (1.0 - s.alpha))
+    woven + value(&closed(m.shape), 1.0 - s.alpha)
 }
 
 /// The same sheet without a gap.

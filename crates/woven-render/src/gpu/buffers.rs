@@ -67,9 +67,9 @@ impl Frame {
 }
 
 /// Bytes of the shader's `Slot`; a test compares them.
-pub const SLOT: u64 = 1504;
-/// Most blocks of one submit: their slots take about 100 MB.
-const RANGE: u32 = 1024;
+pub const SLOT: u64 = 2640;
+/// Most blocks of one submit: their slots take about 90 MB.
+const RANGE: u32 = 512;
 
 /// Blocks of pixels for whose paths there is room.
 pub(super) fn range(width: u32, height: u32) -> u32 {

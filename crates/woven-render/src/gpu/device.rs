@@ -1,6 +1,7 @@
 //! Adapters, the device, waiting for it, and its errors as sentences.
 
 use anyhow::{Result, anyhow, bail};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -90,6 +91,8 @@ pub(super) struct Device {
     pub(super) max_binding: u64,
     pub(super) max_groups: u32,
     trouble: Arc<Mutex<Option<String>>>,
+    /// The device is gone for good.
+    lost: Arc<AtomicBool>,
 }
 
 impl Device {
@@ -128,10 +131,11 @@ impl Device {
         let slot = Arc::clone(&trouble);
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| keep(&slot, e.to_string())));
         let slot = Arc::clone(&trouble);
-        device.set_device_lost_callback(move |reason, what| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                keep(&slot, format!("the device was lost: {what}"));
-            }
+        let lost = Arc::new(AtomicBool::new(false));
+        let gone = Arc::clone(&lost);
+        device.set_device_lost_callback(move |_, what| {
+            gone.store(true, Ordering::SeqCst);
+            keep(&slot, format!("the device was lost: {what}"));
         });
         Ok(Self {
             device,
@@ -144,7 +148,14 @@ impl Device {
                 .min(1 << 30),
             max_groups: limits.max_compute_workgroups_per_dimension,
             trouble,
+            lost,
         })
+    }
+
+    /// Takes the device away, as a driver that was reset does. For tests.
+    pub(super) fn lose(&self) {
+        self.lost.store(true, Ordering::SeqCst);
+        self.device.destroy();
     }
 
     /// The first error since the last look.
@@ -155,6 +166,7 @@ impl Device {
                 self.name,
                 what.lines().next().unwrap_or("an error without a text")
             ),
+            _ if self.lost.load(Ordering::SeqCst) => bail!("{}: the device was lost", self.name),
             _ => Ok(()),
         }
     }

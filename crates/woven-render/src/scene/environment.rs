@@ -9,6 +9,11 @@ use std::path::Path;
 /// Decoded pixels of one map take at most this many bytes: 16384 x 8192.
 pub const LIMIT: u64 = 16_384 * 8_192 * 12;
 
+/// A file may unfold to this many bytes however small it is, and to [`UNFOLDS`] times its own beside.
+const FREE: u64 = 256 << 20;
+/// See [`FREE`].
+const UNFOLDS: u64 = 64;
+
 /// Radiance above this is cut off: the largest half-precision number. Some writers store the sun as infinity.
 const BRIGHTEST: f32 = 65_504.0;
 
@@ -73,7 +78,7 @@ pub fn decode_hdr(bytes: &[u8]) -> Result<Pixels> {
     let decoder = image::codecs::hdr::HdrDecoder::new(Cursor::new(bytes))
         .map_err(|e| anyhow!("it is no Radiance picture: {e}"))?;
     let (w, h) = decoder.dimensions();
-    let need = u64::from(w) * u64::from(h) * 12;
+    let need = (u64::from(w) * u64::from(h)).saturating_mul(12);
     ensure!(w > 0 && h > 0, "it has no pixels");
     ensure!(
         need <= LIMIT,
@@ -81,9 +86,9 @@ pub fn decode_hdr(bytes: &[u8]) -> Result<Pixels> {
         need >> 20,
         LIMIT >> 20
     );
-    // A run-length code packs at most 127 numbers of one byte into two.
+    // A run-length code packs at most 127 numbers of one byte into two; a sky that somebody photographed is not packed at all.
     ensure!(
-        need / 12 * 4 / 64 <= bytes.len() as u64,
+        need / 12 * 4 / 64 <= bytes.len() as u64 && need * 2 <= FREE + UNFOLDS * bytes.len() as u64,
         "its header claims {w} x {h} pixels, more than {} bytes can hold",
         bytes.len()
     );

@@ -8,9 +8,11 @@ mod container;
 mod images;
 mod material;
 pub mod motion;
+mod png;
 mod uri;
 
 pub use container::{Limits, read_file};
+pub use images::decode_picture;
 pub use material::dress;
 pub use uri::{Source, resolve};
 
@@ -216,10 +218,12 @@ fn assemble(checked: Checked, base: &Path, options: &Options) -> Result<Loaded> 
         .map_err(|e| anyhow!("the scene does not follow glTF 2.0: {e}"))?;
 
     let mut pictures = images::Pictures::new(&document, base, &buffers, &options.limits);
-    let mut materials = document
+    let (mut materials, sets): (Vec<_>, Vec<_>) = document
         .materials()
         .map(|m| material::convert(&m, &mut pictures, &mut notes))
-        .collect::<Result<Vec<_>>>()?;
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .unzip();
     for (m, material) in document.materials().zip(&mut materials) {
         if let Some(file) = woven_extra(m.extras().as_deref())
             .as_ref()
@@ -261,6 +265,7 @@ fn assemble(checked: Checked, base: &Path, options: &Options) -> Result<Loaded> 
     let mut walk = Walk {
         buffers: &buffers,
         options,
+        sets: &sets,
         scene: &mut scene,
         notes: &mut notes,
         triangles: 0,
@@ -303,6 +308,8 @@ fn woven_extra(extras: Option<&serde_json::value::RawValue>) -> Option<Value> {
 struct Walk<'a> {
     buffers: &'a [Vec<u8>],
     options: &'a Options,
+    /// The set of texture coordinates of each material.
+    sets: &'a [u32],
     scene: &'a mut Scene,
     notes: &'a mut Vec<String>,
     triangles: usize,
@@ -352,6 +359,9 @@ impl Walk<'_> {
                 if portal {
                     self.scene.portals.push(portal_of(&made)?);
                 } else {
+                    if let Some(colors) = self.colors(&primitive)? {
+                        self.scene.colors.push((self.scene.meshes.len(), colors));
+                    }
                     self.scene.meshes.push(made);
                 }
             }
@@ -422,9 +432,6 @@ impl Walk<'_> {
             self.triangles <= limit,
             "the scene has more than {limit} triangles when its instances are written out"
         );
-        if reader.read_colors(0).is_some() {
-            self.notes.push("vertex colours left out".into());
-        }
         let positions: Vec<Vec3> = local.iter().map(|&p| world.transform_point3(p)).collect();
         ensure!(
             positions.iter().all(|p| p.is_finite()),
@@ -437,7 +444,8 @@ impl Walk<'_> {
                 .collect(),
             None => Vec::new(),
         };
-        let uvs: Vec<Vec2> = match reader.read_tex_coords(0) {
+        let set = p.material().index().and_then(|i| self.sets.get(i)).copied();
+        let uvs: Vec<Vec2> = match reader.read_tex_coords(set.unwrap_or(0)) {
             Some(uv) => uv.into_f32().map(Vec2::from).collect(),
             None => Vec::new(),
         };
@@ -469,6 +477,26 @@ impl Walk<'_> {
             material,
             moving: false,
         }))
+    }
+
+    /// COLOR_0 of a primitive, linear; its alpha is left out.
+    fn colors(&mut self, p: &gltf::Primitive<'_>) -> Result<Option<Vec<[f32; 3]>>> {
+        let reader = p.reader(|b| self.buffers.get(b.index()).map(Vec::as_slice));
+        let Some(colors) = reader.read_colors(0) else {
+            return Ok(None);
+        };
+        let all: Vec<[f32; 4]> = colors.into_rgba_f32().collect();
+        ensure!(
+            all.iter().flatten().all(|c| c.is_finite()),
+            "a colour of a vertex is not finite"
+        );
+        if all.iter().any(|c| c[3] < 1.0)
+            && p.material().alpha_mode() != gltf::material::AlphaMode::Opaque
+        {
+            self.notes
+                .push("the alpha of vertex colours left out".into());
+        }
+        Ok(Some(all.iter().map(|c| [c[0], c[1], c[2]]).collect()))
     }
 
     fn camera(&mut self, camera: &gltf::Camera<'_>, node: &gltf::Node<'_>, world: Mat4) {

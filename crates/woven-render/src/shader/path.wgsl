@@ -18,10 +18,15 @@ struct Second {
     beyond: array<vec3<f32>, LAYERS>,
 }
 
+// Where a camera ray is scattered: its first sheet, and one of those behind for all of them.
+const FIRSTS: u32 = 2u;
+
 struct Begun {
     taken: Taken,
-    has_first: bool,
-    first: Vertex,
+    firsts: array<Vertex, FIRSTS>,
+    // Probability with which the path begins there; 0: there is no such point.
+    shares: array<f32, FIRSTS>,
+    chosen: u32,
     has_second: bool,
     second: Second,
 }
@@ -134,10 +139,10 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
     var carry = vec3<f32>(1.0);
     var bounce = 0u;
     // What the camera ray's crossings leave for the indirect part.
-    var found = false;
-    var chosen: Vertex;
-    var chosen_weight = 1.0;
-    var all_weights = 0.0;
+    var firsts: array<Vertex, FIRSTS>;
+    var front = 0.0;
+    var rest = 0.0;
+    var kept_weight = 1.0;
     var pick = rng_coin(&rng);
     // The vertex that the path left last, and the density with which it did.
     var v: Vertex;
@@ -157,7 +162,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
         if (miss) {
             given = sky(ray.d);
         } else {
-            s = surface(hit);
+            s = surface(hit, select(0.0, hit.t * sqrt(length2(frame.up)) / f32(frame.height), camera));
             gap = gap_of(s.material, s, ray.d);
             // A path goes straight on through gaps, each by a coin.
             if (!camera && gap > 0.0) {
@@ -244,16 +249,21 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
                     add_light(&out, begun.has_second, lit.layer, lit.value * carry);
                 }
                 if (camera) {
-                    // Reservoir of one: each crossing is kept in proportion to its weight.
-                    all_weights += weight;
-                    let keep = weight / all_weights;
-                    if (pick < keep) {
-                        pick /= keep;
-                        found = true;
-                        chosen = Vertex(s, at, wo, carry);
-                        chosen_weight = weight;
+                    let vertex = Vertex(s, at, wo, carry);
+                    if (front <= 0.0) {
+                        firsts[0] = vertex;
+                        front = weight;
                     } else {
-                        pick = (pick - keep) / (1.0 - keep);
+                        // Reservoir of one: each crossing is kept in proportion to its weight.
+                        rest += weight;
+                        let keep = weight / rest;
+                        if (pick < keep) {
+                            pick /= keep;
+                            firsts[1] = vertex;
+                            kept_weight = weight;
+                        } else {
+                            pick = (pick - keep) / (1.0 - keep);
+                        }
                     }
                 } else {
                     v = Vertex(s, at, wo, carry);
@@ -282,12 +292,20 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
             // The camera ray has ended; the path begins at the crossing that was kept.
             camera = false;
             bounce = 0u;
-            v = chosen;
-            carry = chosen.throughput * (all_weights / chosen_weight);
+            scatter = front > 0.0;
+            firsts[1].throughput *= rest / kept_weight;
+            let share = front / max(front + rest, 1e-30);
+            v = firsts[0];
+            carry = v.throughput / max(share, 1e-30);
+            if (pick >= share && rest > 0.0) {
+                begun.chosen = 1u;
+                v = firsts[1];
+                carry = v.throughput / (1.0 - share);
+            }
             v.throughput = carry;
-            scatter = found;
-            begun.has_first = found;
-            begun.first = v;
+            begun.firsts = firsts;
+            begun.shares[0] = share;
+            begun.shares[1] = select(0.0, 1.0 - share, rest > 0.0);
         }
         if (!scatter) {
             break;
@@ -334,7 +352,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
 }
 
 fn add_discs(out: ptr<function, Taken>, d: vec3<f32>, passed: f32) {
-    for (var i = 0u; i < frame.globals.lights; i++) {
+    for (var i = frame.globals.others; i < frame.globals.lights; i++) {
         if (lights[i].kind == SUN && lights[i].u.y > 1e-4 && dot(d, lights[i].n) > lights[i].u.x) {
             add_light(out, false, lights[i].layer, lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
         }

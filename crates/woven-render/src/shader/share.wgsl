@@ -11,7 +11,6 @@ const PATHS: u32 = 0x70617468u;
 // A point of a sheet, as the passes leave it to each other.
 struct Point {
     p: vec3<f32>,
-    // None: no point.
     material: u32,
     ng: vec3<f32>,
     alpha: f32,
@@ -23,19 +22,26 @@ struct Point {
 // What the passes leave to each other for one pixel.
 struct Slot {
     // Where the camera ray is scattered.
-    first: Point,
-    wo: vec3<f32>,
-    // Of the gaps on the own path's way to its second point.
+    firsts: array<FirstRow, FIRSTS>,
+    // Of the gaps on the own path's way to its second point, and where the path began.
     passed: f32,
-    throughput: vec3<f32>,
+    chosen: u32,
     // Decides whether the second point is kept.
     coin: f32,
-    second: SecondRow,
     // What the second point scatters, about.
     brightness: f32,
+    second: SecondRow,
     taken: PixelSum,
-    // Of the second points that are kept, in order: density and what the pixel takes of their light.
-    sights: array<vec4<f32>, GROUP>,
+    // Of the second points that are kept, in order, from each first point: density and what the pixel takes of their light.
+    sights: array<array<vec4<f32>, FIRSTS>, GROUP>,
+}
+
+struct FirstRow {
+    point: Point,
+    wo: vec3<f32>,
+    // Probability with which the path begins here; 0: there is no such point.
+    share: f32,
+    throughput: vec3<f32>,
 }
 
 struct SecondRow {
@@ -76,7 +82,9 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     let slot = workgroup.x * GROUP + member;
     let corner = corner_of(frame.block + workgroup.x);
     let pixel = corner + vec2<i32>(vec2<u32>(member % BLOCK, member / BLOCK));
-    slots[slot].first.material = NONE;
+    for (var k = 0u; k < FIRSTS; k++) {
+        slots[slot].firsts[k].share = 0.0;
+    }
     slots[slot].brightness = 0.0;
     if (!inside(pixel)) {
         return;
@@ -95,19 +103,20 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     slots[slot].taken.direct[2].w = b.taken.depth;
     slots[slot].taken.albedo = vec4<f32>(b.taken.albedo, 0.0);
     slots[slot].taken.normal = vec4<f32>(b.taken.normal, 0.0);
-    if (!b.has_first) {
-        return;
+    for (var k = 0u; k < FIRSTS; k++) {
+        slots[slot].firsts[k].share = b.shares[k];
+        slots[slot].firsts[k].point = point_of(b.firsts[k].s);
+        slots[slot].firsts[k].wo = b.firsts[k].wo;
+        slots[slot].firsts[k].throughput = b.firsts[k].throughput;
     }
-    slots[slot].first = point_of(b.first.s);
-    slots[slot].wo = b.first.wo;
-    slots[slot].throughput = b.first.throughput;
+    slots[slot].chosen = b.chosen;
     if (!b.has_second) {
         return;
     }
     slots[slot].brightness = brightness(b.second);
     slots[slot].passed = b.second.passed;
     slots[slot].second.point = point_of(b.second.s);
-    slots[slot].second.side = u32(dot(b.second.s.ng, b.second.s.p - b.first.s.p) < 0.0);
+    slots[slot].second.side = u32(dot(b.second.s.ng, b.second.s.p - b.firsts[b.chosen].s.p) < 0.0);
     slots[slot].second.layer = b.second.lit.layer;
     slots[slot].second.pdf = b.second.lit.pdf;
     slots[slot].second.lit_wi = b.second.lit.wi;
@@ -154,11 +163,6 @@ fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_in
     let base = workgroup.x * GROUP;
     let slot = base + member;
     let total = total_of(base);
-    let has = slots[slot].first.material != NONE;
-    var x: Surface;
-    if (has) {
-        x = surface_of(slots[slot].first);
-    }
     // No coin is tossed on the way.
     var unused = Rng(0u, 0u, 0u);
     var n = 0u;
@@ -167,33 +171,38 @@ fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_in
         if (keeping(i, total) <= 0.0) {
             continue;
         }
-        var sight = vec4<f32>(0.0);
-        if (has) {
-            let y = slots[i].second.point.p;
-            let begin = leave(x, y - x.p);
-            let to = y - begin;
-            let distance2 = max(length2(to), 1e-12);
-            let distance = sqrt(distance2);
-            let d = to * (1.0 / distance);
-            let c = dot(slots[i].second.point.ng, d);
-            if ((c < 0.0) == (slots[i].second.side == 1u)) {
-                let wi = local(x, d);
-                let b = scattering(x.material, x, slots[slot].wo, wi, false, vec3<f32>(0.0));
-                let density = b.pdf * (1.0 - gap_of(slots[i].second.point.material, surface_of(slots[i].second.point), d));
-                if (density > 0.0) {
-                    var passed = slots[slot].passed;
-                    if (k != member) {
-                        passed = transmittance(
-                            ray_new(begin, d), distance - (1e-4 + 1e-4 * distance), 1e-12, true, &unused,
-                        );
+        for (var which = 0u; which < FIRSTS; which++) {
+            var sight = vec4<f32>(0.0);
+            let share = slots[slot].firsts[which].share;
+            if (share > 0.0) {
+                let x = surface_of(slots[slot].firsts[which].point);
+                let y = slots[i].second.point.p;
+                let begin = leave(x, y - x.p);
+                let to = y - begin;
+                let distance2 = max(length2(to), 1e-12);
+                let distance = sqrt(distance2);
+                let d = to * (1.0 / distance);
+                let c = dot(slots[i].second.point.ng, d);
+                if ((c < 0.0) == (slots[i].second.side == 1u)) {
+                    let wi = local(x, d);
+                    let b = scattering(x.material, x, slots[slot].firsts[which].wo, wi, false, vec3<f32>(0.0));
+                    let yarn = 1.0 - gap_of(slots[i].second.point.material, surface_of(slots[i].second.point), d);
+                    let density = share * b.pdf * yarn;
+                    if (density > 0.0) {
+                        var passed = slots[slot].passed;
+                        if (k != member || which != slots[slot].chosen) {
+                            passed = transmittance(
+                                ray_new(begin, d), distance - (1e-4 + 1e-4 * distance), 1e-12, true, &unused,
+                            );
+                        }
+                        let seen = abs(c) / distance2 * passed;
+                        let carry = slots[slot].firsts[which].throughput * b.f * (abs(wi.z) * seen);
+                        sight = vec4<f32>(carry, density * seen);
                     }
-                    let seen = abs(c) / distance2 * passed;
-                    let carry = slots[slot].throughput * b.f * (abs(wi.z) * seen);
-                    sight = vec4<f32>(carry, density * seen);
                 }
             }
+            slots[slot].sights[n][which] = sight;
         }
-        slots[slot].sights[n] = sight;
         n += 1u;
     }
 }
@@ -216,10 +225,6 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     for (var k = 0u; k < LAYERS; k++) {
         light[k] = slots[slot].taken.indirect[k].xyz;
     }
-    var x: Surface;
-    if (slots[slot].first.material != NONE) {
-        x = surface_of(slots[slot].first);
-    }
     var n = 0u;
     for (var m = 0u; m < GROUP; m++) {
         let i = base + m;
@@ -227,14 +232,18 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
         if (q <= 0.0) {
             continue;
         }
-        let sight = slots[slot].sights[n];
-        if (sight.w > 0.0) {
+        for (var which = 0u; which < FIRSTS; which++) {
+            let sight = slots[slot].sights[n][which];
+            if (sight.w <= 0.0) {
+                continue;
+            }
             var all_densities = 0.0;
             for (var k = 0u; k < GROUP; k++) {
-                all_densities += slots[base + k].sights[n].w;
+                all_densities += slots[base + k].sights[n][0].w + slots[base + k].sights[n][1].w;
             }
             let carry = sight.xyz * (1.0 / (q * all_densities));
             let s = surface_of(slots[i].second.point);
+            let x = surface_of(slots[slot].firsts[which].point);
             let to = s.p - leave(x, s.p - x.p);
             let wo = local(s, to * (-1.0 / sqrt(max(length2(to), 1e-12))));
             // Light that was sampled there, then what the path found beyond: one place for the scattering.

@@ -80,7 +80,24 @@ fn second_edge(place: u32) -> vec3<f32> {
     return vec3<f32>(packets[p].e2[0][lane], packets[p].e2[1][lane], packets[p].e2[2][lane]);
 }
 
-fn surface(hit: Hit) -> Surface {
+// The frame turned to the normal that the texture's colour means.
+fn bent(f: mat3x3<f32>, hand: f32, scale: f32, c: vec4<f32>) -> mat3x3<f32> {
+    let across = (c.x * 2.0 - 1.0) * scale;
+    let up = (c.y * 2.0 - 1.0) * scale * hand;
+    let out = max(c.z * 2.0 - 1.0, 0.05);
+    let n = unit(f[0] * across + f[1] * up + f[2] * out);
+    let along = f[0] - n * dot(f[0], n);
+    let size = sqrt(length2(along));
+    var x: vec3<f32>;
+    if (size > 1e-4) {
+        x = along * (1.0 / size);
+    } else {
+        x = any_tangent(n);
+    }
+    return mat3x3<f32>(x, cross(n, x), n);
+}
+
+fn surface(hit: Hit, wide: f32) -> Surface {
     let place = hit.place;
     let e1 = first_edge(place);
     let e2 = second_edge(place);
@@ -89,15 +106,28 @@ fn surface(hit: Hit) -> Surface {
     var tint = vec3<f32>(1.0);
     var alpha = 1.0;
     var uv = vec2<f32>(0.0);
+    var f = shading_frame(place, hit.u, hit.v, ng);
     if (materials[material].color_texture != NONE || materials[material].coverage_texture != NONE
-        || materials[material].emission_texture != NONE) {
+        || materials[material].emission_texture != NONE || materials[material].normal_texture != NONE) {
         uv = uv_at(place, hit.u, hit.v);
+        let area = wide * wide * shades[place].v.w;
         if (materials[material].color_texture != NONE) {
-            tint = texel(materials[material].color_texture, uv).xyz;
+            tint = texel(materials[material].color_texture, uv, area).xyz;
         }
-        alpha = coverage(material, uv);
+        if (materials[material].normal_texture != NONE) {
+            let c = texel(materials[material].normal_texture, uv, area);
+            f = bent(f, shades[place].weft.w, materials[material].normal_scale, c);
+        }
+        alpha = coverage(material, uv, area);
     }
-    let f = shading_frame(place, hit.u, hit.v, ng);
+    if (shades[place].colors.w != 0u) {
+        let w = vec3<f32>(1.0 - hit.u - hit.v, hit.u, hit.v);
+        var sum = vec3<f32>(0.0);
+        for (var k = 0u; k < 3u; k++) {
+            sum += decode(shades[place].colors[k], true).xyz * w[k];
+        }
+        tint *= sum;
+    }
     let p = corner(place) + e1 * hit.u + e2 * hit.v;
     return Surface(p, ng, f[0], f[1], f[2], uv, material, shades[place].light, tint, alpha);
 }
@@ -126,7 +156,7 @@ fn gap_at(place: u32, u: f32, v: f32, d: vec3<f32>) -> f32 {
     let m = shades[place].material;
     var alpha = 1.0;
     if (materials[m].coverage_texture != NONE) {
-        alpha = coverage(m, uv_at(place, u, v));
+        alpha = coverage(m, uv_at(place, u, v), 0.0);
         if (alpha <= 0.0) {
             return covered(m, 0.0, 1.0);
         }
@@ -140,11 +170,11 @@ fn gap_at(place: u32, u: f32, v: f32, d: vec3<f32>) -> f32 {
     return covered(m, alpha, open_along(m, w));
 }
 
-fn coverage(m: u32, uv: vec2<f32>) -> f32 {
+fn coverage(m: u32, uv: vec2<f32>, area: f32) -> f32 {
     if (materials[m].coverage_texture == NONE) {
         return 1.0;
     }
-    let alpha = texel(materials[m].coverage_texture, uv).w;
+    let alpha = texel(materials[m].coverage_texture, uv, area).w;
     if (materials[m].alpha_cutoff < 0.0) {
         return alpha;
     }
@@ -172,31 +202,59 @@ fn decode(word: u32, srgb: bool) -> vec4<f32> {
     return c;
 }
 
-fn texel(number: u32, uv: vec2<f32>) -> vec4<f32> {
+// Averaged over the area of (u, v): trilinear between the copies whose texels are just smaller and just larger.
+fn texel(number: u32, uv: vec2<f32>, area: f32) -> vec4<f32> {
     let row = SRGB + number * TEXTURE_ROW;
-    let a = vec3<f32>(bitcast<f32>(texels[row]), bitcast<f32>(texels[row + 1u]), bitcast<f32>(texels[row + 2u]));
-    let b = vec3<f32>(bitcast<f32>(texels[row + 4u]), bitcast<f32>(texels[row + 5u]), bitcast<f32>(texels[row + 6u]));
-    let first = texels[row + 8u];
-    let width = i32(texels[row + 9u]);
-    let height = i32(texels[row + 10u]);
+    let a = vec4<f32>(
+        bitcast<f32>(texels[row]), bitcast<f32>(texels[row + 1u]), bitcast<f32>(texels[row + 2u]), bitcast<f32>(texels[row + 3u]),
+    );
+    let b = vec4<f32>(
+        bitcast<f32>(texels[row + 4u]), bitcast<f32>(texels[row + 5u]), bitcast<f32>(texels[row + 6u]), bitcast<f32>(texels[row + 7u]),
+    );
+    var first = texels[row + 8u];
+    var width = i32(texels[row + 9u]);
+    var height = i32(texels[row + 10u]);
     let flags = texels[row + 11u];
-    let x = (a.x * uv.x + a.y * uv.y + a.z) * f32(width) - 0.5;
-    let y = (b.x * uv.x + b.y * uv.y + b.z) * f32(height) - 0.5;
-    let x0 = floor(x);
-    let y0 = floor(y);
-    var rows: array<vec4<f32>, 2>;
-    // A bound that the compiler does not know keeps the four taps one piece of code.
-    for (var tap = 0u; tap < frame.globals.taps; tap++) {
-        let i = wrapped(i32(x0) + i32(tap & 1u), width, flags & 3u);
-        let j = wrapped(i32(y0) + i32(tap >> 1u), height, (flags >> 2u) & 3u);
-        let c = decode(texels[first + u32(j * width + i)], (flags & 16u) != 0u);
-        if ((tap & 1u) == 0u) {
-            rows[tap >> 1u] = c;
-        } else {
-            rows[tap >> 1u] += (c - rows[tap >> 1u]) * (x - x0);
-        }
+    let level = min(0.5 * log2(max(area * a.w, 1.0)), b.w);
+    let below = floor(level);
+    for (var k = 0u; k < u32(below); k++) {
+        first += u32(width * height);
+        width = max(width / 2, 1);
+        height = max(height / 2, 1);
     }
-    return rows[0] + (rows[1] - rows[0]) * (y - y0);
+    let s = a.x * uv.x + a.y * uv.y + a.z;
+    let t = b.x * uv.x + b.y * uv.y + b.z;
+    var low = vec4<f32>(0.0);
+    for (var k = 0u; k < 2u; k++) {
+        let x = s * f32(width) - 0.5;
+        let y = t * f32(height) - 0.5;
+        let x0 = floor(x);
+        let y0 = floor(y);
+        var rows: array<vec4<f32>, 2>;
+        // A bound that the compiler does not know keeps the four taps one piece of code.
+        for (var tap = 0u; tap < frame.globals.taps; tap++) {
+            let i = wrapped(i32(x0) + i32(tap & 1u), width, flags & 3u);
+            let j = wrapped(i32(y0) + i32(tap >> 1u), height, (flags >> 2u) & 3u);
+            let c = decode(texels[first + u32(j * width + i)], (flags & 16u) != 0u);
+            if ((tap & 1u) == 0u) {
+                rows[tap >> 1u] = c;
+            } else {
+                rows[tap >> 1u] += (c - rows[tap >> 1u]) * (x - x0);
+            }
+        }
+        let c = rows[0] + (rows[1] - rows[0]) * (y - y0);
+        if (k == 1u) {
+            return low + (c - low) * (level - below);
+        }
+        if (level <= below) {
+            return c;
+        }
+        low = c;
+        first += u32(width * height);
+        width = max(width / 2, 1);
+        height = max(height / 2, 1);
+    }
+    return low;
 }
 
 fn emission(m: u32, s: Surface, wo: vec3<f32>) -> vec3<f32> {
@@ -208,7 +266,7 @@ fn emission(m: u32, s: Surface, wo: vec3<f32>) -> vec3<f32> {
     if (materials[m].emission_texture == NONE) {
         return e;
     }
-    return e * texel(materials[m].emission_texture, s.uv).xyz;
+    return e * texel(materials[m].emission_texture, s.uv, 0.0).xyz;
 }
 
 fn emission_at(place: u32, u: f32, v: f32) -> vec3<f32> {
@@ -217,7 +275,7 @@ fn emission_at(place: u32, u: f32, v: f32) -> vec3<f32> {
     if (materials[m].emission_texture == NONE) {
         return e;
     }
-    return e * texel(materials[m].emission_texture, uv_at(place, u, v)).xyz;
+    return e * texel(materials[m].emission_texture, uv_at(place, u, v), 0.0).xyz;
 }
 
 // A direction, f for it, its density.
@@ -270,17 +328,18 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
         pdf = sheet_pdf(shape, weights, wo, wi);
     }
     var f = vec3<f32>(0.0);
-    var part = scale;
+    var part = s.alpha;
+    let plain = (flags & PLAIN_GLOSS) != 0u;
     // The woven share, then the closed one where a map tells them apart: one copy of the code.
     let parts = select(1u, 2u, (flags & MULTIPLIES) != 0u);
     for (var k = 0u; k < parts; k++) {
         let basis = sheet_basis(shape, wi, wo);
         f += (materials[m].linear[0].xyz * basis[0] + materials[m].linear[1].xyz * basis[1]
-            + materials[m].linear[2u + back].xyz * basis[2] + materials[m].linear[3u + back].xyz * basis[3]
-            + materials[m].linear[4u + back].xyz * basis[4]) * part;
+            + materials[m].linear[2u + back].xyz * basis[2] + materials[m].linear[4u + back].xyz * basis[4]) * (s.tint * part)
+            + materials[m].linear[3u + back].xyz * basis[3] * select(s.tint * part, vec3<f32>(part), plain);
         shape[0] = 1.0;
         shape[8] = 1.0;
-        part = s.tint * (1.0 - s.alpha);
+        part = 1.0 - s.alpha;
     }
     return Scattered(wi, f, pdf);
 }

@@ -18,8 +18,9 @@ const DOUBLE_SIDED: u32 = 2u;
 const TRANSMITS: u32 = 4u;
 const EMITS: u32 = 8u;
 const EVEN: u32 = 16u;
-const MEASURED: u32 = 32u;
-const MULTIPLIES: u32 = 64u;
+const PLAIN_GLOSS: u32 = 32u;
+const MEASURED: u32 = 64u;
+const MULTIPLIES: u32 = 128u;
 
 // LightRow.kind
 const RECT: u32 = 0u;
@@ -48,6 +49,7 @@ struct Shade {
     n2: vec4<f32>,
     weft: vec4<f32>,
     v: vec4<f32>,
+    colors: vec4<u32>,
     material: u32,
     light: u32,
     mesh: u32,
@@ -68,8 +70,10 @@ struct MaterialRow {
     alpha_cutoff: f32,
     gap: f32,
     cover: f32,
+    normal_texture: u32,
+    normal_scale: f32,
     measured: u32,
-    unused: array<u32, 3>,
+    unused: u32,
 }
 
 struct LightRow {
@@ -98,6 +102,8 @@ struct Globals {
     soft_lights: u32,
     offset: f32,
     taps: u32,
+    others: u32,
+    spare: array<u32, 3>,
 }
 
 struct Frame {

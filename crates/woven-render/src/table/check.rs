@@ -58,9 +58,14 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
             "material \"{}\" has a factor that is negative or not a number",
             m.name
         );
-        for used in [m.color_texture, m.coverage_texture, m.emission_texture]
-            .into_iter()
-            .flatten()
+        for used in [
+            m.color_texture,
+            m.coverage_texture,
+            m.emission_texture,
+            m.normal_texture,
+        ]
+        .into_iter()
+        .flatten()
         {
             ensure!(
                 used.texture < scene.textures.len(),
@@ -70,6 +75,16 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
                 scene.textures.len()
             );
         }
+    }
+    for (mesh, colors) in &scene.colors {
+        ensure!(
+            scene
+                .meshes
+                .get(*mesh)
+                .is_some_and(|m| m.positions.len() == colors.len())
+                && colors.iter().flatten().all(|c| c.is_finite()),
+            "there are colours of vertices for mesh {mesh}, which is not there or has another number of vertices"
+        );
     }
     let whole = |t: &Texture| {
         t.width > 0 && t.height > 0 && t.pixels.len() == t.width as usize * t.height as usize

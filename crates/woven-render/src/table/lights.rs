@@ -19,6 +19,7 @@ pub(super) fn fill(table: &mut Table, scene: &Scene, light_layers: bool) {
         }
     };
     let mut rows = emitters(table);
+    table.globals.others = rows.len() as u32;
     for light in &scene.lights {
         rows.push(match *light {
             Light::Sun {
@@ -84,10 +85,7 @@ pub(super) fn fill(table: &mut Table, scene: &Scene, light_layers: bool) {
         });
     }
     table.globals.lights = rows.len() as u32;
-    table.globals.soft_lights = u32::from(
-        rows.iter()
-            .any(|r| r.kind == TRIANGLE || (r.kind == RECT && r.area < 0.0)),
-    );
+    table.globals.soft_lights = soft(table, &rows);
     accumulate(table, &mut rows);
     rows.extend(scene.portals.iter().map(portal));
     table.globals.portals = scene.portals.len() as u32;
@@ -100,18 +98,43 @@ pub(super) fn moved(table: &mut Table) {
     let fixed: Vec<LightRow> = table.lights.iter().copied().filter(lit).collect();
     let (windows, others): (Vec<_>, Vec<_>) = fixed.into_iter().partition(|r| r.kind == PORTAL);
     let mut rows = emitters(table);
+    table.globals.others = rows.len() as u32;
     rows.extend(others);
     table.globals.lights = rows.len() as u32;
     if let Some(sky) = rows.iter().position(|r| r.kind == SKY) {
         table.globals.sky_light = sky as u32;
     }
-    table.globals.soft_lights = u32::from(
-        rows.iter()
-            .any(|r| r.kind == TRIANGLE || (r.kind == RECT && r.area < 0.0)),
-    );
+    table.globals.soft_lights = soft(table, &rows);
     accumulate(table, &mut rows);
     rows.extend(windows);
     table.lights = rows;
+}
+
+/// Whether scattering must meet some light too: triangles, and those whose texture was found black (see [`glow`]).
+fn soft(table: &Table, rows: &[LightRow]) -> u32 {
+    let textured = |m: &super::MaterialRow| m.flags & EMITS != 0 && m.emission_texture != NONE;
+    let triangle = |r: &LightRow| r.kind == TRIANGLE || (r.kind == RECT && r.area < 0.0);
+    u32::from(rows.iter().any(triangle) || table.materials.iter().any(textured))
+}
+
+/// Mean radiance of a triangle whose emission has a texture, at the middles of 64 smaller triangles. A place that they
+/// miss is still seen, only not sampled.
+fn glow(table: &Table, place: usize) -> Vec3 {
+    const N: usize = 8;
+    let mut sum = Vec3::ZERO;
+    for i in 0..N {
+        for j in 0..N - i {
+            let at = |i: f32, j: f32| {
+                crate::cpu::surface::emission_at(table, place as u32, i / N as f32, j / N as f32)
+            };
+            let (i, j) = (i as f32, j as f32);
+            sum += at(i + 1.0 / 3.0, j + 1.0 / 3.0);
+            if i + j < (N - 1) as f32 {
+                sum += at(i + 2.0 / 3.0, j + 2.0 / 3.0);
+            }
+        }
+    }
+    sum / (N * N) as f32
 }
 
 /// Rows for the triangles that emit; two that form a parallelogram become one rectangle.
@@ -131,7 +154,7 @@ fn emitters(table: &mut Table) -> Vec<LightRow> {
             .get(k + 1)
             .map(|n| n.2)
             .filter(|&n| table.shade[n].mesh == table.shade[place].mesh);
-        let material = &table.materials[table.shade[place].material as usize];
+        let material = table.materials[table.shade[place].material as usize];
         let plain = material.emission_texture == NONE;
         let quad = next
             .filter(|_| plain)
@@ -142,7 +165,13 @@ fn emitters(table: &mut Table) -> Vec<LightRow> {
         let kind = if quad.is_some() { RECT } else { TRIANGLE };
         let square = u.dot(v).abs() < 1e-4 * u.length() * v.length();
         let area = cross.length() * if quad.is_some() { 1.0 } else { 0.5 };
-        if area > 0.0 {
+        let radiance = if plain {
+            Vec3::from_slice(&material.emission[..3])
+        } else {
+            glow(table, place)
+        };
+        table.shade[place].light = NONE;
+        if area > 0.0 && radiance.max_element() > 0.0 {
             let row = rows.len() as u32;
             table.shade[place].light = row;
             if let (Some(n), true) = (next, quad.is_some()) {
@@ -157,11 +186,7 @@ fn emitters(table: &mut Table) -> Vec<LightRow> {
                 place: place as u32,
                 n: cross.normalize().into(),
                 area: if kind == RECT && !square { -area } else { area },
-                radiance: [
-                    material.emission[0],
-                    material.emission[1],
-                    material.emission[2],
-                ],
+                radiance: radiance.into(),
                 cumulative: if material.flags & DOUBLE_SIDED != 0 {
                     2.0
                 } else {

@@ -4,7 +4,8 @@ use glam::Vec3;
 use woven_bsdf::measured::table::Tabulated;
 
 use super::{
-    DOUBLE_SIDED, EMITS, EVEN, MATT, MEASURED, MULTIPLIES, MaterialRow, NONE, TRANSMITS, TextureRow,
+    DOUBLE_SIDED, EMITS, EVEN, MATT, MEASURED, MULTIPLIES, MaterialRow, NONE, PLAIN_GLOSS,
+    TRANSMITS, TextureRow, mips,
 };
 use crate::optics;
 use crate::scene::{LAYERS, MAX_LINEAR, Material, Scene, TextureUse, Wrap};
@@ -46,6 +47,7 @@ pub(super) fn row(
     set(!black(0) || !black(1), TRANSMITS);
     set(m.emission.iter().any(|&e| e > 0.0), EMITS);
     set(even, EVEN);
+    set(m.plain_gloss, PLAIN_GLOSS);
     MaterialRow {
         linear,
         shape: m.shape,
@@ -68,7 +70,9 @@ pub(super) fn row(
         },
         cover: 1.0 - optics::openness(&m.shape, Vec3::Z).clamp(0.0, 1.0),
         measured: m.measured.as_ref().map_or(NONE, |t| textures.measured(t)),
-        unused: [0; 3],
+        normal_texture: textures.row(m.normal_texture, scene),
+        normal_scale: m.normal_scale,
+        unused: 0,
     }
 }
 
@@ -77,8 +81,8 @@ pub(super) fn row(
 pub(super) struct Textures {
     pub(super) rows: Vec<TextureRow>,
     pub(super) texels: Vec<u32>,
-    /// (number in the scene, first texel)
-    there: Vec<(usize, u32)>,
+    /// (number in the scene, first texel, smaller copies)
+    there: Vec<(usize, u32, u32)>,
 }
 
 impl Textures {
@@ -92,14 +96,13 @@ impl Textures {
     fn row(&mut self, used: Option<TextureUse>, scene: &Scene) -> u32 {
         let Some(used) = used else { return NONE };
         let texture = &scene.textures[used.texture];
-        let first = match self.there.iter().find(|t| t.0 == used.texture) {
-            Some(&(_, first)) => first,
+        let (first, copies) = match self.there.iter().find(|t| t.0 == used.texture) {
+            Some(&(_, first, copies)) => (first, copies),
             None => {
                 let first = self.texels.len() as u32;
-                self.texels
-                    .extend(texture.pixels.iter().map(|&p| u32::from_le_bytes(p)));
-                self.there.push((used.texture, first));
-                first
+                let copies = mips::append(texture, &mut self.texels);
+                self.there.push((used.texture, first, copies));
+                (first, copies)
             }
         };
         let wrap = |w: Wrap| match w {
@@ -108,9 +111,10 @@ impl Textures {
             Wrap::Clamp => 2,
         };
         let [[a, b, c], [d, e, f]] = used.transform;
+        let density = (a * e - b * d).abs() * texture.width as f32 * texture.height as f32;
         self.rows.push(TextureRow {
-            map_u: [a, b, c, 0.0],
-            map_v: [d, e, f, 0.0],
+            map_u: [a, b, c, density],
+            map_v: [d, e, f, copies as f32],
             first,
             width: texture.width,
             height: texture.height,

@@ -17,10 +17,12 @@ pub struct Shade {
     pub n1: [f32; 4],
     /// Of the third corner.
     pub n2: [f32; 4],
-    /// Direction of the weft (dp/du), then nothing.
+    /// Direction of the weft (dp/du), then -1 where the texture is mirrored, else 1.
     pub weft: [f32; 4],
-    /// v of the three corners, then nothing.
+    /// v of the three corners, then the area of the triangle in (u, v) over its area in metres.
     pub v: [f32; 4],
+    /// Colours of the corners, sRGB of 8 bits, red lowest; then 1 where there are any.
+    pub colors: [u32; 4],
     /// Row of the material.
     pub material: u32,
     /// Row of the light that this triangle is (part of), or [`NONE`].
@@ -60,10 +62,14 @@ pub struct MaterialRow {
     pub gap: f32,
     /// Cover by yarn in every direction, where [`EVEN`].
     pub cover: f32,
+    /// Row of the texture that bends the normal or [`NONE`].
+    pub normal_texture: u32,
+    /// Multiplies its first two numbers.
+    pub normal_scale: f32,
     /// First word of the measured table among [`super::Table::texels`], where [`MEASURED`].
     pub measured: u32,
     /// Nothing.
-    pub unused: [u32; 3],
+    pub unused: u32,
 }
 
 /// [`MaterialRow::flags`]: no lobes, diffuse terms only.
@@ -76,21 +82,22 @@ pub const TRANSMITS: u32 = 4;
 pub const EMITS: u32 = 8;
 /// [`MaterialRow::flags`]: the same cover in every direction.
 pub const EVEN: u32 = 16;
-
+/// [`MaterialRow::flags`]: textures do not colour the reflection lobe.
+pub const PLAIN_GLOSS: u32 = 32;
 /// [`MaterialRow::flags`]: scatters as a table says.
-pub const MEASURED: u32 = 32;
+pub const MEASURED: u32 = 64;
 /// [`MaterialRow::flags`]: the coverage texture multiplies the openness.
-pub const MULTIPLIES: u32 = 64;
+pub const MULTIPLIES: u32 = 128;
 
 /// A texture and how to reach it.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct TextureRow {
-    /// First row of the affine map of (u, v, 1), then nothing.
+    /// First row of the affine map of (u, v, 1), then texels a square of side 1 in (u, v).
     pub map_u: [f32; 4],
-    /// Second row.
+    /// Second row, then the number of smaller copies after the picture, each of half the side, down to one texel.
     pub map_v: [f32; 4],
-    /// First texel.
+    /// First texel; the smaller copies follow.
     pub first: u32,
     /// Columns.
     pub width: u32,
@@ -169,4 +176,8 @@ pub struct Globals {
     pub offset: f32,
     /// 4, the taps of a bilinear texture: a loop bound that shader compilers do not know.
     pub taps: u32,
+    /// First light that is no surface: suns are looked for from there.
+    pub others: u32,
+    /// Nothing.
+    pub spare: [u32; 3],
 }

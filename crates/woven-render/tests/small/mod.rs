@@ -1,6 +1,9 @@
 //! Small scenes that tests write themselves.
 #![allow(dead_code, reason = "each test file uses a part")]
 
+pub(crate) mod corpus;
+pub(crate) mod pictures;
+
 use serde_json::{Value, json};
 
 /// A GLB from its JSON and binary chunk.

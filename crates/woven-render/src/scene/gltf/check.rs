@@ -100,7 +100,62 @@ pub(super) fn document(root: &Value, limits: &Limits) -> Result<()> {
         indices(s, "nodes", list(root, "nodes").len()).map(drop)
     })?;
     optional_index(root, "scene", list(root, "scenes").len())?;
-    tree(root)
+    tree(root)?;
+    written_out(root, limits)
+}
+
+/// Triangles and vertices that a scene may have however few bytes it has; beyond it may have one for each byte of its buffers. A file of
+/// a few hundred bytes can ask for a million copies of its one mesh, or for a million zeros.
+const FREE: u64 = 1 << 20;
+
+/// What the scene takes when its instances are written out, told before anything is.
+fn written_out(root: &Value, limits: &Limits) -> Result<()> {
+    let (accessors, meshes) = (list(root, "accessors"), list(root, "meshes"));
+    let count = |n: Option<&Value>| {
+        n.and_then(Value::as_u64)
+            .and_then(|n| accessors.get(n as usize))
+            .and_then(|a| a["count"].as_u64())
+    };
+    let mut sizes = Vec::with_capacity(meshes.len());
+    for mesh in meshes {
+        let (mut triangles, mut vertices) = (0_u64, 0_u64);
+        for p in mesh["primitives"].as_array().into_iter().flatten() {
+            let points = count(p["attributes"].get("POSITION")).unwrap_or(0);
+            let order = count(p.get("indices")).unwrap_or(points);
+            vertices += points;
+            triangles += match p.get("mode").and_then(Value::as_u64).unwrap_or(4) {
+                4 => order / 3,
+                5 | 6 => order.saturating_sub(2),
+                _ => 0,
+            };
+        }
+        sizes.push((triangles, vertices));
+    }
+    let (mut triangles, mut vertices) = (0_u64, 0_u64);
+    for n in list(root, "nodes") {
+        if let Some((t, v)) = n
+            .get("mesh")
+            .and_then(Value::as_u64)
+            .and_then(|m| sizes.get(m as usize))
+        {
+            triangles = triangles.saturating_add(*t);
+            vertices = vertices.saturating_add(*v);
+        }
+    }
+    ensure!(
+        triangles <= limits.triangles as u64,
+        "the scene has more than {} triangles when its instances are written out ({triangles})",
+        limits.triangles
+    );
+    let bytes = list(root, "buffers")
+        .iter()
+        .filter_map(|b| b["byteLength"].as_u64())
+        .fold(0, u64::saturating_add);
+    ensure!(
+        triangles.max(vertices) <= FREE.saturating_add(bytes),
+        "the scene has {triangles} triangles and {vertices} vertices when its instances are written out, too many for buffers of {bytes} bytes"
+    );
+    Ok(())
 }
 
 fn each(root: &Value, name: &str, mut check: impl FnMut(&Value) -> Result<()>) -> Result<()> {
@@ -264,7 +319,7 @@ pub(super) fn accessor(root: &Value, a: &Value) -> Result<AccessorShape> {
             )?;
         }
         // 3.6.2.3: without a view the elements are zero; they cost memory all the same.
-        None => ensure!(count <= 1 << 24, "{count} elements without a bufferView"),
+        None => ensure!(count <= FREE, "{count} elements without a bufferView"),
     }
     if object(a, "sparse")?.is_some() {
         let sparse = &a["sparse"];

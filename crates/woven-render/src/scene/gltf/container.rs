@@ -85,7 +85,7 @@ pub(super) fn open(bytes: &[u8], limits: &Limits) -> Result<Container> {
     } else {
         (bytes, None)
     };
-    check_depth(text, limits.json_depth)?;
+    check_text(text, limits.json_depth)?;
     // glTF writers in the wild pad with spaces or zeros and some begin with a byte-order mark.
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let end = text.iter().rposition(|b| *b != 0).map_or(0, |i| i + 1);
@@ -133,9 +133,17 @@ fn split_glb(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
     Ok((json.context("the GLB file has no JSON chunk")?, bin))
 }
 
-/// Counts braces outside strings, so that a hostile depth never reaches a parser that recurses.
-fn check_depth(text: &[u8], limit: usize) -> Result<()> {
+/// What the JSON may take in memory. A text of zeros unfolds thirtyfold and one of small objects a hundredfold.
+const JSON_ROOM: usize = 384 << 20;
+/// Bytes that an object takes at most while it is read (a node of the map, then the record made from it), and any other value or string.
+const OBJECT: usize = 640;
+/// See [`OBJECT`].
+const VALUE: usize = 64;
+
+/// Counts braces, commas and strings, so that neither a hostile depth nor a hostile number of values reaches the parser.
+fn check_text(text: &[u8], limit: usize) -> Result<()> {
     let (mut depth, mut in_string, mut escaped) = (0_usize, false, false);
+    let mut room = 0_usize;
     for &b in text {
         if in_string {
             match b {
@@ -146,12 +154,23 @@ fn check_depth(text: &[u8], limit: usize) -> Result<()> {
             }
         } else {
             match b {
-                b'"' => in_string = true,
+                b'"' => {
+                    in_string = true;
+                    room += VALUE / 2;
+                }
+                b',' => room += VALUE,
                 b'{' | b'[' => {
                     depth += 1;
+                    room += if b == b'{' { OBJECT } else { VALUE };
                     ensure!(
                         depth <= limit,
                         "the scene's JSON is nested deeper than {limit} levels"
+                    );
+                    ensure!(
+                        room <= JSON_ROOM,
+                        "the scene's JSON would take more than {} MiB; its {} MiB are too many small values",
+                        JSON_ROOM >> 20,
+                        text.len() >> 20
                     );
                 }
                 b'}' | b']' => depth = depth.saturating_sub(1),
@@ -159,6 +178,12 @@ fn check_depth(text: &[u8], limit: usize) -> Result<()> {
             }
         }
     }
+    ensure!(
+        room <= JSON_ROOM,
+        "the scene's JSON would take more than {} MiB; its {} MiB are too many small values",
+        JSON_ROOM >> 20,
+        text.len() >> 20
+    );
     Ok(())
 }
 

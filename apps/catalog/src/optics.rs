@@ -133,7 +133,7 @@ fn color(fabric: &mut Fabric, tint: [f64; 3]) {
         return;
     }
     let tint = tint.map(|c| c / luminance);
-    let names = ["t_d", "k_t", "r_d", "k_r"];
+    let names = ["t_d", "k_t", "r_d", "k_r", "sheen"];
     let sum: f64 = names
         .iter()
         .filter_map(|n| fabric.optics.parameters.get(*n))

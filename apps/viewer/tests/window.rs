@@ -241,15 +241,15 @@ fn what_is_saved_is_opened_again() {
     window
         .get_by_role_and_label(Role::Slider, "gamma_warp")
         .set_value_accesskit(0.5);
-    wait(&mut window, |v| v.cloth().values[4] == 0.5);
+    let sheet = find("sheet").expect("it is in the list");
+    let place = sheet.params.iter().position(|p| p.name == "gamma_warp");
+    let place = place.expect("the sheet has a weave");
+    wait(&mut window, |v| v.cloth().values[place] == 0.5);
     let path = folder.join("mine.toml");
     window.state_mut().save_fabric(&path);
     let back = Cloth::open(&path).expect("its own files are read");
     assert_eq!(back.values, window.state().cloth().values);
-    assert_eq!(
-        (back.name(), back.model.name),
-        ("mine", find("sheet").expect("it is in the list").name)
-    );
+    assert_eq!((back.name(), back.model.name), ("mine", sheet.name));
 
     wait(&mut window, Viewer::finished);
     let picture = folder.join("mine.png");

@@ -9,9 +9,9 @@ use woven_fit::starts::normal;
 
 const SIDE: u32 = 192;
 
-/// t_d, k_t, r_d, k_r, closed weave, widths of both lobes, f0.
-const SHEET: [f64; 12] = [
-    0.15, 0.35, 0.35, 0.15, 1.0, 1.0, 0.5, 0.30, 0.15, 0.35, 0.25, 0.04,
+/// t_d, k_t, r_d, k_r, no sheen, closed weave, widths of both lobes, f0.
+const SHEET: [f64; 13] = [
+    0.15, 0.35, 0.35, 0.15, 0.0, 1.0, 1.0, 0.5, 0.30, 0.15, 0.35, 0.25, 0.04,
 ];
 
 /// The photo as PNG bytes: light that the lamp gives times the sheet's value, 3 % of noise a pixel, eight bits.

@@ -60,7 +60,7 @@ fn a_yarn_never_gives_more_than_it_gets() {
         cloth.values[i] = 1.0;
         cloth.colors[i] = [1.0; 3];
     }
-    assert_eq!(cloth.given(), 4.0);
+    assert_eq!(cloth.given(), 5.0);
     let sum: f64 = cloth.optics().0.iter().map(|k| k[1]).sum();
     assert!((sum - 1.0).abs() < 1e-12);
     assert!(Fabric::from_toml(&cloth.fabric("full").to_toml()).is_ok());

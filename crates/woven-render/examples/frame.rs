@@ -3,8 +3,12 @@
 //!
 //! `cargo run --release -p woven-render --example frame -- SCENE.glb [MESH] [WIDTHxHEIGHT] [FRAMES] [CONVERGED_SPP]`
 
+#[path = "process/mod.rs"]
+mod process;
+
 use anyhow::{Context, Result};
 use glam::Vec3;
+use process::{cpu_seconds, peak_memory};
 use std::path::Path;
 use std::time::Instant;
 use woven_render::compare::{Picture, compare};
@@ -12,23 +16,6 @@ use woven_render::denoise::{self, denoise};
 use woven_render::film::Film;
 use woven_render::render::{Backend, Integrator, Renderer, Settings};
 use woven_render::scene::gltf;
-
-/// CPU seconds of this process, all threads.
-fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let rest = stat.rsplit(')').next().unwrap_or("");
-    let fields: Vec<&str> = rest.split_whitespace().collect();
-    let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok());
-    (ticks(11).unwrap_or(0.0) + ticks(12).unwrap_or(0.0)) / 100.0
-}
-
-/// Most memory that this process has held \[MiB\].
-fn memory() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|l| l.starts_with("VmHWM"));
-    let kib = line.and_then(|l| l.split_whitespace().nth(1)?.parse::<f64>().ok());
-    kib.unwrap_or(0.0) / 1024.0
-}
 
 /// The curtain at frame `k`: a wave that runs across it, stronger towards the hem.
 fn swayed(rest: &[Vec3], k: u32) -> Vec<Vec3> {
@@ -152,7 +139,7 @@ fn main() -> Result<()> {
                 100.0 * update / each / wall,
                 100.0 * sampling / each / wall,
                 100.0 * filter / each / wall,
-                memory()
+                peak_memory()
             );
         }
     }

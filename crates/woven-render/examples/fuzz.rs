@@ -7,6 +7,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+#[path = "process/mod.rs"]
+mod process;
 #[path = "../tests/small/mod.rs"]
 mod small;
 
@@ -42,15 +44,6 @@ fn main() {
     }
 }
 
-/// The greatest resident memory so far [MiB], where the system tells.
-fn peak() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|l| l.starts_with("VmHWM"));
-    line.and_then(|l| l.split_whitespace().nth(1)?.parse::<u64>().ok())
-        .unwrap_or(0)
-        / 1024
-}
-
 fn run(target: &corpus::Target, first: u64, count: u64) {
     let (begun, mut told) = (Instant::now(), Instant::now());
     let (mut understood, mut done, mut bytes, mut slowest) = (0_u64, 0_u64, Vec::new(), (0.0, 0));
@@ -78,7 +71,7 @@ fn run(target: &corpus::Target, first: u64, count: u64) {
                 "{}: {done} executions, {understood} understood, no panic, {seconds:.0} s, {rate:.0} a second, {:.0} s left, peak {} MiB, slowest {:.0} ms (number {})",
                 target.name,
                 (count - done) as f64 / rate,
-                peak(),
+                process::peak_memory(),
                 slowest.0 * 1e3,
                 slowest.1
             );

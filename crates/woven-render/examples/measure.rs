@@ -3,30 +3,16 @@
 //!
 //! `cargo run --release -p woven-render --example measure -- SCENE.glb [WIDTHxHEIGHT] [SPP] [OUT.png]`
 
+#[path = "process/mod.rs"]
+mod process;
+
 use anyhow::{Context, Result};
+use process::cpu_seconds;
 use std::path::Path;
 use std::time::Instant;
 use woven_render::film::Curve;
 use woven_render::render::{Backend, Integrator, Settings, render};
 use woven_render::scene::Scene;
-
-/// CPU seconds of this process, all threads.
-fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields: Vec<&str> = stat
-        .rsplit(')')
-        .next()
-        .unwrap_or("")
-        .split_whitespace()
-        .collect();
-    let ticks = |i: usize| {
-        fields
-            .get(i)
-            .and_then(|f| f.parse::<f64>().ok())
-            .unwrap_or(0.0)
-    };
-    (ticks(11) + ticks(12)) / 100.0
-}
 
 /// relMSE of one of two pictures, from the difference of a pixel in both.
 fn error(p: [f32; 3], q: [f32; 3]) -> f64 {

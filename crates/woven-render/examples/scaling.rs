@@ -1,15 +1,22 @@
 //! What a sample costs as the work grows: folds 1 to 64, triangles 10^3 to 10^7, lights 1 to 1000, on the CPU.
 //!
-//! `cargo run --release -p woven-render --example scaling -- [PLOT.svg] [MOST_TRIANGLES]` prints one table and draws it.
+//! `cargo run --release -p woven-render --example scaling -- [PLOT.svg] [MOST_TRIANGLES] [SERIES]` prints one table and draws it;
+//! SERIES is folds, triangles or lights, all of them without.
 //! Times are processor time of all threads over samples of pixels; the best of three runs is taken, since other
 //! programs only ever add to it. Noise is relMSE of two seeds at the samples rendered.
 
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "process/mod.rs"]
+mod process;
+
 use anyhow::{Context, Result};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
+use process::cpu_seconds;
 use std::fmt::Write;
 use std::time::Instant;
 use woven_render::render::{Backend, Integrator, Renderer, Settings};
-use woven_render::scene::{Camera, Material, Mesh, Portal, Scene};
+use woven_render::scene::{Mesh, Scene};
 
 /// One measured point.
 struct Point {
@@ -21,34 +28,6 @@ struct Point {
     /// Seconds for the table and the ray structure, and for moving the curtain (refit).
     build: f64,
     refit: f64,
-}
-
-fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields: Vec<&str> = stat
-        .rsplit(')')
-        .next()
-        .unwrap_or("")
-        .split_whitespace()
-        .collect();
-    let ticks = |i: usize| {
-        fields
-            .get(i)
-            .and_then(|f| f.parse::<f64>().ok())
-            .unwrap_or(0.0)
-    };
-    (ticks(11) + ticks(12)) / 100.0
-}
-
-fn quad(corner: Vec3, u: Vec3, v: Vec3, material: usize) -> Mesh {
-    Mesh {
-        name: "quad".into(),
-        positions: vec![corner, corner + u, corner + u + v, corner + v],
-        uvs: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
-        indices: vec![[0, 1, 2], [0, 2, 3]],
-        material,
-        ..Mesh::default()
-    }
 }
 
 /// A sheet 2 m wide in nine pleats before the window, or a flat one.
@@ -78,60 +57,14 @@ fn sheet(columns: usize, rows: usize, z: f32, pleat: f32) -> Mesh {
     mesh
 }
 
-/// A room with a window and `panels` lamps of the same light together outside of it; the cloth is what is asked for.
+/// A room with a window and `panels` lamps of the same light together outside of it, with gaps between so that no two are one;
+/// the cloth is what is asked for.
 fn room(cloth: Vec<Mesh>, panels: usize) -> Scene {
-    let wall = |x0: f32, y0: f32, x1: f32, y1: f32| {
-        quad(
-            Vec3::new(x0, y0, 0.0),
-            Vec3::X * (x1 - x0),
-            Vec3::Y * (y1 - y0),
-            0,
-        )
-    };
-    let (w, h, d) = (Vec3::X * 4.0, Vec3::Y * 2.6, Vec3::Z * 3.0);
-    let lo = Vec3::new(-2.0, 0.0, 0.0);
-    let mut meshes = vec![
-        quad(lo, d, w, 1),
-        quad(lo + h, w, d, 0),
-        quad(lo + d, h, w, 0),
-        quad(lo, h, d, 0),
-        quad(lo + w, d, h, 0),
-        wall(-2.0, 0.0, -0.8, 2.6),
-        wall(0.8, 0.0, 2.0, 2.6),
-        wall(-0.8, 0.0, 0.8, 0.8),
-        wall(-0.8, 2.2, 0.8, 2.6),
-    ];
-    // The panel cut into a grid with gaps between, so that no two are one.
-    let across = (panels as f32).sqrt().ceil() as usize;
-    let side = 1.8 / across as f32;
-    for k in 0..panels {
-        let (i, j) = ((k % across) as f32, (k / across) as f32);
-        let corner = Vec3::new(-1.5 + i * side, 1.1 + j * side, -1.0);
-        meshes.push(quad(corner, Vec3::X * side * 0.9, Vec3::Y * side * 0.9, 2));
-    }
-    meshes.extend(cloth);
-    let radiance = 6.0 * (across * across) as f32 / panels as f32;
-    Scene {
-        meshes,
-        materials: vec![
-            Material::matt("wall", [0.7, 0.68, 0.62]),
-            Material::matt("floor", [0.4, 0.3, 0.22]),
-            Material::lamp("panel", [radiance; 3], false),
-            Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35),
-        ],
-        portals: vec![Portal {
-            corner: Vec3::new(-0.8, 0.8, 0.0),
-            edge_u: Vec3::X * 1.6,
-            edge_v: Vec3::Y * 1.4,
-        }],
-        camera: Camera::look_at(
-            Vec3::new(0.7, 1.45, 2.75),
-            Vec3::new(0.0, 1.45, 0.05),
-            Vec3::Y,
-            0.67,
-        ),
-        ..Scene::default()
-    }
+    let mut scene = common::curtain_room(common::even_lace(), 2);
+    scene.meshes.retain(|m| m.name != "curtain");
+    common::cut_panel(&mut scene, panels, 0.9);
+    scene.meshes.extend(cloth);
+    scene
 }
 
 fn measure(scene: &Scene, n: usize) -> Result<Point> {
@@ -203,6 +136,7 @@ fn main() -> Result<()> {
         .next()
         .map_or(Ok(10_000_000), |n| n.parse())
         .context("the second word is a number of triangles")?;
+    let only = args.next();
     let mut series: Vec<(&str, Vec<Point>)> = Vec::new();
     println!(
         "| what | n | direct, µs a sample | everything, µs | relMSE of everything, 8 spp | build, s | refit, s |\n|---|---|---|---|---|---|---|"
@@ -210,6 +144,9 @@ fn main() -> Result<()> {
     let mut add =
         |name: &'static str, points: &mut dyn Iterator<Item = (usize, Scene)>| -> Result<()> {
             let mut list = Vec::new();
+            if only.as_deref().is_some_and(|o| o != name) {
+                return Ok(());
+            }
             for (n, scene) in points {
                 let p = measure(&scene, n)?;
                 println!(

@@ -8,7 +8,7 @@ use crate::cpu::math::luminance;
 use crate::cpu::path::Sample;
 use crate::film::{BEAUTY, Film};
 use crate::render::Settings;
-use crate::scene::{LAYER_NAMES, LAYERS};
+use crate::scene::{EVENT_NAMES, LAYER_NAMES, LAYERS};
 
 /// Sums over the samples of one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -134,7 +134,7 @@ impl Accumulation {
         })
     }
 
-    /// The means as a film: "beauty", with `light_layers` one "light.NAME" each, with `aov` "albedo", "normal",
+    /// The means as a film: "beauty", with `light_layers` or `event_layers` one "light.NAME" each, with `aov` "albedo", "normal",
     /// "depth" \[m\], "gap", "variance" (of the mean of the luminance, from the samples' scatter, where there are at
     /// least two), and "indirect" and "indirect.NAME": the share of light that was scattered before it came to what is
     /// seen. "direct.variance" and "indirect.variance" are those of the two parts.
@@ -162,8 +162,13 @@ impl Accumulation {
             film.push(name, self.pixels.iter().map(f).collect());
         };
         layer(BEAUTY, &sum);
-        if settings.light_layers {
-            for (i, name) in LAYER_NAMES.iter().enumerate() {
+        let names = if settings.event_layers {
+            Some(EVENT_NAMES)
+        } else {
+            settings.light_layers.then_some(LAYER_NAMES)
+        };
+        if let Some(names) = &names {
+            for (i, name) in names.iter().enumerate() {
                 layer(&format!("light.{name}"), &|p| {
                     let (a, b) = (rgb(&p.direct[i]), rgb(&p.indirect[i]));
                     std::array::from_fn(|c| a[c] + b[c])
@@ -191,8 +196,8 @@ impl Accumulation {
                     variance(indirect(p), p.indirect[0][3])
                 });
             }
-            if settings.light_layers {
-                for (i, name) in LAYER_NAMES.iter().enumerate() {
+            if let Some(names) = &names {
+                for (i, name) in names.iter().enumerate() {
                     layer(&format!("indirect.{name}"), &|p| rgb(&p.indirect[i]));
                 }
             }

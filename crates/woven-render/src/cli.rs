@@ -130,6 +130,10 @@ pub(crate) struct RenderArgs {
     /// Keep one layer per light (sun, sky, lamps, other) in the EXR.
     #[arg(long)]
     pub(crate) light_layers: bool,
+    /// Keep one layer for what the first sheet in view has scattered back (reflected), scattered through (transmitted), let
+    /// pass by its gaps (gap), and given off (emitted) instead; their sum is the picture.
+    #[arg(long, conflicts_with = "light_layers")]
+    pub(crate) event_layers: bool,
     /// Brightness of a PNG in stops, added to the camera's.
     #[arg(
         long,

@@ -9,6 +9,7 @@ pub(crate) mod path;
 pub(crate) mod rect;
 pub(crate) mod share;
 pub(crate) mod surface;
+mod tree;
 
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};

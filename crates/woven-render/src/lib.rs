@@ -9,6 +9,7 @@ pub mod optics;
 pub mod render;
 pub mod rng;
 pub mod scene;
+pub mod shutter;
 pub mod table;
 
 // Files and tools.

@@ -11,6 +11,7 @@ use crate::cpu;
 use crate::cpu::path::View;
 use crate::film::Film;
 use crate::scene::{Camera, Scene};
+use crate::shutter::{Pose, Shutter};
 use crate::table::Table;
 
 /// What is counted as light.
@@ -52,6 +53,9 @@ pub struct Settings {
     pub integrator: Integrator,
     /// Keep the light of each layer apart.
     pub light_layers: bool,
+    /// Keep apart instead what the first sheet that the camera's ray meets has scattered back, scattered through, let pass
+    /// by its gaps, or given off ([`crate::scene::EVENT_NAMES`]).
+    pub event_layers: bool,
     /// Add albedo, normal, depth, gap and variance.
     pub aov: bool,
     /// Stop after this time with the samples gathered by then (at least one a pixel).
@@ -70,6 +74,7 @@ impl Default for Settings {
             seed: 0,
             integrator: Integrator::Path,
             light_layers: false,
+            event_layers: false,
             aov: false,
             time_limit: None,
             noise: None,
@@ -115,6 +120,8 @@ pub struct Renderer {
     /// Complete for the CPU; for the GPU the state of the last read-back.
     sums: Accumulation,
     engine: Engine,
+    /// The mesh that moves while samples are gathered.
+    shutter: Option<Shutter>,
     note: Option<String>,
     /// Samples and means at the last power of two.
     half: Option<(u32, Vec<[f32; 3]>)>,
@@ -146,7 +153,12 @@ impl Renderer {
             settings.spp > 0,
             "0 samples a pixel give no picture; ask for at least 1"
         );
-        let table = Table::new(scene, settings.light_layers)?;
+        ensure!(
+            !(settings.light_layers && settings.event_layers),
+            "light is kept apart by lamp or by event, not by both at once; render twice with the same seed"
+        );
+        let mut table = Table::new(scene, settings.light_layers)?;
+        table.globals.events = u32::from(settings.event_layers);
         let sums = Accumulation::new(w, h);
         let mut note = None;
         let engine = match backend {
@@ -168,6 +180,7 @@ impl Renderer {
             settings: *settings,
             sums,
             engine,
+            shutter: None,
             note,
             half: None,
             noise: None,
@@ -241,43 +254,57 @@ impl Renderer {
     /// # Errors
     /// When the GPU fails and the CPU cannot go on in its place.
     pub fn step(&mut self, count: u32, stop: &AtomicBool) -> Result<bool> {
-        let view = view(&self.table, &self.settings);
-        let before = self.samples();
-        if let Engine::Gpu(gpu) = &mut self.engine {
-            match gpu.step(&view, count, stop) {
-                Ok(done) => return Ok(done),
-                Err(why) => {
-                    // What was gathered since the last read-back is gathered again, on a fresh device or the CPU.
-                    let goal = before + count;
-                    self.recover(&why, goal, stop)?;
-                    return Ok(self.samples() >= goal);
-                }
-            }
-        }
-        Ok(cpu::step(&self.table, &view, &mut self.sums, count, stop))
+        let goal = self.samples() + count;
+        let Err(why) = self.gather(goal, stop) else {
+            return Ok(self.samples() >= goal);
+        };
+        self.recover(&why, goal, stop)?;
+        Ok(self.samples() >= goal)
     }
 
-    fn recover(&mut self, why: &anyhow::Error, goal: u32, stop: &AtomicBool) -> Result<()> {
+    /// Gathers samples until there are `goal`, each with the mesh where it is at its moment.
+    fn gather(&mut self, goal: u32, stop: &AtomicBool) -> Result<()> {
         let view = view(&self.table, &self.settings);
-        let again = crate::gpu::Gpu::new(&self.table, &view, true).and_then(|mut gpu| {
-            gpu.restore(&self.sums)?;
-            gpu.step(&view, goal - self.sums.samples, stop)?;
-            Ok(gpu)
-        });
-        match again {
-            Ok(gpu) => {
-                self.note = Some(format!(
-                    "the GPU was lost and has been set up again: {why:#}"
-                ));
-                self.engine = Engine::Gpu(Box::new(gpu));
+        while self.samples() < goal {
+            let mut count = goal - self.samples();
+            let index = self.samples();
+            if let Some(shutter) = &mut self.shutter {
+                count = count.min(shutter.left(index));
+                if let Some(pose) = shutter.turn(index) {
+                    let mesh = shutter.mesh;
+                    self.place_mesh(mesh, &pose.positions, &pose.normals)?;
+                }
             }
-            Err(_) => {
-                self.note = Some(format!("the GPU failed, going on with the CPU: {why:#}"));
-                self.engine = Engine::Cpu;
-                let missing = goal - self.sums.samples;
-                cpu::step(&self.table, &view, &mut self.sums, missing, stop);
+            let whole = match &mut self.engine {
+                Engine::Gpu(gpu) => gpu.step(&view, count, stop)?,
+                Engine::Cpu => cpu::step(&self.table, &view, &mut self.sums, count, stop),
+            };
+            if !whole {
+                break;
             }
         }
+        Ok(())
+    }
+
+    /// What was gathered since the last read-back is gathered again, on a fresh device or the CPU.
+    fn recover(&mut self, why: &anyhow::Error, goal: u32, stop: &AtomicBool) -> Result<()> {
+        let view = view(&self.table, &self.settings);
+        let fresh = crate::gpu::Gpu::new(&self.table, &view, true).and_then(|mut gpu| {
+            gpu.restore(&self.sums)?;
+            Ok(gpu)
+        });
+        let again = fresh.and_then(|gpu| {
+            self.engine = Engine::Gpu(Box::new(gpu));
+            self.gather(goal, stop)
+        });
+        self.note = Some(match again {
+            Ok(()) => format!("the GPU was lost and has been set up again: {why:#}"),
+            Err(_) => {
+                self.engine = Engine::Cpu;
+                self.gather(goal, stop)?;
+                format!("the GPU failed, going on with the CPU: {why:#}")
+            }
+        });
         Ok(())
     }
 
@@ -467,16 +494,38 @@ impl Renderer {
         self.clear()
     }
 
-    /// Moves the vertices of a mesh (refits the ray structure); forgets the samples. `normals` may be empty.
+    /// Moves the vertices of a mesh (refits the ray structure), which then stands there; forgets the samples. `normals` may
+    /// be empty.
     ///
     /// # Errors
     /// When the mesh is not there or has another number of vertices.
     pub fn move_mesh(&mut self, mesh: usize, positions: &[Vec3], normals: &[Vec3]) -> Result<()> {
+        self.shutter = None;
+        self.place_mesh(mesh, positions, normals)?;
+        self.clear()
+    }
+
+    /// Lets a mesh move through `poses`, evenly spaced in time, while the samples are gathered: it blurs. Forgets the
+    /// samples. The same sums at any number of threads and after any pause, for a moment depends on the number of the sample
+    /// alone (and on [`Settings::spp`], where neither time nor noise ends the render).
+    ///
+    /// # Errors
+    /// When the mesh is not there, or the poses do not fit it.
+    pub fn open_shutter(&mut self, mesh: usize, poses: Vec<Pose>) -> Result<()> {
+        // Every pose must fit before the first sample.
+        for pose in &poses {
+            self.table.fits(mesh, &pose.positions, &pose.normals)?;
+        }
+        self.shutter = Some(Shutter::new(mesh, poses, &self.settings)?);
+        self.clear()
+    }
+
+    fn place_mesh(&mut self, mesh: usize, positions: &[Vec3], normals: &[Vec3]) -> Result<()> {
         self.table.move_mesh(mesh, positions, normals)?;
         if let Engine::Gpu(gpu) = &mut self.engine {
             gpu.moved(&self.table)?;
         }
-        self.clear()
+        Ok(())
     }
 }
 

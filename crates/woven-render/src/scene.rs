@@ -21,6 +21,9 @@ pub const MAX_LINEAR: usize = 8;
 pub const LAYERS: usize = 4;
 /// Names of the light layers in the order of their numbers.
 pub const LAYER_NAMES: [&str; LAYERS] = ["sun", "sky", "lamps", "other"];
+/// Names of the same layers where light is kept apart by what happened at the first sheet that the camera's ray meets:
+/// scattered back, scattered through, passed by a gap or no sheet at all, or given off there.
+pub const EVENT_NAMES: [&str; LAYERS] = ["reflected", "transmitted", "gap", "emitted"];
 /// Light layer of the sun (and of any other [`Light::Sun`]).
 pub const LAYER_SUN: u32 = 0;
 /// Light layer of the environment.

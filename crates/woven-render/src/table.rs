@@ -9,6 +9,7 @@ mod material;
 mod mips;
 mod rows;
 mod sky;
+mod tree;
 
 use anyhow::{Result, bail, ensure};
 use glam::{Vec2, Vec3};
@@ -135,7 +136,25 @@ impl Table {
     /// # Errors
     /// When the mesh is not there, or has another number of vertices.
     pub fn move_mesh(&mut self, mesh: usize, positions: &[Vec3], normals: &[Vec3]) -> Result<()> {
-        let Some(old) = self.meshes.get_mut(mesh) else {
+        self.fits(mesh, positions, normals)?;
+        let old = &mut self.meshes[mesh];
+        old.positions.copy_from_slice(positions);
+        old.normals = normals.to_vec();
+        for (t, triangle) in old.indices.iter().enumerate() {
+            self.corners[self.first[mesh] + t] = triangle.map(|i| positions[i as usize]);
+        }
+        self.bvh.refit(&self.corners);
+        self.fill_shade(Some(mesh));
+        lights::moved(self);
+        Ok(())
+    }
+
+    /// Whether mesh `mesh` can be moved there.
+    ///
+    /// # Errors
+    /// As [`Self::move_mesh`].
+    pub(crate) fn fits(&self, mesh: usize, positions: &[Vec3], normals: &[Vec3]) -> Result<()> {
+        let Some(old) = self.meshes.get(mesh) else {
             bail!(
                 "the scene has {} meshes and cannot move number {mesh}",
                 self.meshes.len()
@@ -155,14 +174,6 @@ impl Table {
             "mesh \"{}\" was moved to a place that is not a number",
             old.name
         );
-        old.positions.copy_from_slice(positions);
-        old.normals = normals.to_vec();
-        for (t, triangle) in old.indices.iter().enumerate() {
-            self.corners[self.first[mesh] + t] = triangle.map(|i| positions[i as usize]);
-        }
-        self.bvh.refit(&self.corners);
-        self.fill_shade(Some(mesh));
-        lights::moved(self);
         Ok(())
     }
 

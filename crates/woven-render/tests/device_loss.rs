@@ -4,10 +4,9 @@
 
 mod common;
 
-use common::{backends, curtain_room};
+use common::{backends, curtain_room, even_lace};
 use std::sync::atomic::AtomicBool;
 use woven_render::render::{Backend, Renderer, Settings};
-use woven_render::scene::Material;
 
 #[test]
 fn a_lost_device_costs_nothing_but_time() {
@@ -18,8 +17,7 @@ fn a_lost_device_costs_nothing_but_time() {
         .ok()
         .and_then(|n| n.parse().ok())
         .unwrap_or(2);
-    let lace = Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35);
-    let scene = curtain_room(lace, 40);
+    let scene = curtain_room(even_lace(), 40);
     let settings = Settings {
         width: 24,
         height: 16,

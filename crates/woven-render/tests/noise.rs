@@ -2,14 +2,12 @@
 
 mod common;
 
-use common::{curtain_room, picture};
+use common::{curtain_room, even_lace, picture};
 use woven_render::render::{Backend, Renderer, Settings};
-use woven_render::scene::Material;
 
 #[test]
 fn it_stops_at_the_noise_that_was_asked_for() {
-    let lace = Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35);
-    let scene = curtain_room(lace, 40);
+    let scene = curtain_room(even_lace(), 40);
     let base = Settings {
         width: 24,
         height: 16,

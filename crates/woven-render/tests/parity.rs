@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{backends, curtain_room, furnace, mean, picture, quad};
+use common::{backends, curtain_room, cut_panel, even_lace, furnace, mean, picture, quad, sheet};
 use glam::Vec3;
 use woven_bsdf::measured::klems::Klems;
 use woven_bsdf::measured::table::Tabulated;
@@ -100,10 +100,9 @@ const MEANS: f64 = 1e-3;
 
 #[test]
 fn curtain_before_a_panel() {
-    let even = Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35);
     compare(
         "even curtain",
-        &curtain_room(even, 60),
+        &curtain_room(even_lace(), 60),
         &settings(8),
         PIXELS,
         MEANS,
@@ -231,6 +230,52 @@ fn textures_and_lamps() {
     compare("textures and lamps", &scene, &settings(8), PIXELS, MEANS);
 }
 
+/// A tree over lights of every kind, inside and outside of the window; glossy surfaces share them with scattering.
+#[test]
+fn many_lights_of_every_kind() {
+    let mut scene = curtain_room(lace(), 60);
+    cut_panel(&mut scene, 30, 0.9);
+    scene.materials[1] = lace();
+    scene
+        .materials
+        .push(Material::lamp("glow", [2.0, 1.0, 0.5], true));
+    for k in 0..6 {
+        let at = 0.5 * k as f32;
+        scene.meshes.push(quad(
+            "glow",
+            Vec3::new(-1.9, 0.2 + 0.3 * at, 0.3 + at),
+            Vec3::new(0.1, 0.2, 0.05),
+            Vec3::new(0.0, 0.1, 0.2 + 0.1 * at),
+            4,
+        ));
+        scene.lights.push(Light::Point {
+            position: Vec3::new(1.8, 0.4 + 0.3 * at, 0.4 + at),
+            intensity: [0.1, 0.2, 0.05 * at],
+            layer: 2,
+        });
+        scene.lights.push(Light::Spot {
+            position: Vec3::new(at - 1.0, 2.5, 1.0 + 0.3 * at),
+            direction: Vec3::new(0.3 - 0.2 * at, -0.9, -0.3).normalize(),
+            intensity: [1.0, 0.9, 0.8],
+            inner_angle: 0.2,
+            outer_angle: 0.3 + 0.1 * at,
+            layer: 2,
+        });
+    }
+    scene.meshes.last_mut().expect("a lamp").indices.truncate(1);
+    scene.lights.insert(
+        0,
+        Light::Sun {
+            direction: Vec3::new(0.3, 0.5, -1.0).normalize(),
+            irradiance: [3.0; 3],
+            angular_radius: 0.01,
+            layer: LAYER_SUN,
+        },
+    );
+    scene.environment = Some(furnace());
+    compare("many lights", &scene, &settings(8), PIXELS, MEANS);
+}
+
 /// Textures far away, so that their smaller copies are used; bent normals, coloured vertices, a glow with a texture.
 #[test]
 fn small_copies_bent_normals_and_coloured_vertices() {
@@ -277,7 +322,7 @@ fn small_copies_bent_normals_and_coloured_vertices() {
         emission_texture: Some(used(0, 1.0)),
         ..Material::lamp("glow", [0.8; 3], true)
     });
-    scene.meshes.push(common::quad(
+    scene.meshes.push(quad(
         "glow",
         Vec3::new(-1.9, 0.3, 0.6),
         Vec3::Z * 0.8,
@@ -337,14 +382,7 @@ fn a_measured_cloth_in_a_furnace_shows_its_albedo() {
         let eye = Vec3::new(to_eye.x as f32, to_eye.y as f32, to_eye.z as f32) * 4.0;
         let scene = Scene {
             materials: vec![Material::measured("shade", table.clone())],
-            // The weft runs along x, the warp along y.
-            meshes: vec![quad(
-                "sheet",
-                Vec3::new(-2.0, -2.0, 0.0),
-                Vec3::X * 4.0,
-                Vec3::Y * 4.0,
-                0,
-            )],
+            meshes: vec![sheet(0)],
             environment: Some(furnace()),
             // So narrow that the whole picture lies in one patch.
             camera: Camera::look_at(eye, Vec3::ZERO, Vec3::new(0.1, 1.0, 0.2), 0.01),
@@ -389,13 +427,7 @@ fn a_map_of_openness_keeps_the_light() {
     let picture_of = |material: Material, even: f32| {
         let mut scene = Scene {
             materials: vec![material],
-            meshes: vec![quad(
-                "sheet",
-                Vec3::new(-2.0, -2.0, 0.0),
-                Vec3::X * 4.0,
-                Vec3::Y * 4.0,
-                0,
-            )],
+            meshes: vec![sheet(0)],
             environment: Some(furnace()),
             camera: Camera::look_at(Vec3::new(1.0, 0.5, 2.0), Vec3::ZERO, Vec3::Y, 0.1),
             ..Scene::default()
@@ -435,13 +467,7 @@ fn the_back_has_colours_of_its_own() {
     cloth.back = Some(back);
     let seen_from = |z: f32, cloth: &Material| Scene {
         materials: vec![cloth.clone()],
-        meshes: vec![quad(
-            "sheet",
-            Vec3::new(-2.0, -2.0, 0.0),
-            Vec3::X * 4.0,
-            Vec3::Y * 4.0,
-            0,
-        )],
+        meshes: vec![sheet(0)],
         lights: [1.0, -1.0]
             .map(|z| Light::Point {
                 position: Vec3::new(0.4, 0.3, 2.0 * z),

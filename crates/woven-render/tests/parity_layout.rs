@@ -73,7 +73,7 @@ fn rows_lie_where_the_shader_reads_them() {
         unused
     );
     same!(
-        m, LightRow, p, kind, u, layer, v, place, n, area, radiance, cumulative
+        m, LightRow, p, kind, u, layer, v, place, n, area, radiance, parent
     );
     same!(
         m,
@@ -91,6 +91,8 @@ fn rows_lie_where_the_shader_reads_them() {
         offset,
         taps,
         others,
+        tree,
+        events,
         spare
     );
     same!(

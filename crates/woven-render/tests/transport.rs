@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::{backends, curtain_room, furnace, mean, picture, quad, room, sheets_over_floor};
+use common::{
+    backends, curtain_room, even_lace, furnace, mean, picture, quad, room, sheets_over_floor,
+};
 use glam::Vec3;
 use woven_render::render::{Backend, Integrator, Settings};
 use woven_render::scene::{Camera, LAYER_SUN, Light, Material, Scene};
@@ -215,10 +217,7 @@ fn closed_white_box_is_lit_by_one_over_one_minus_rho() {
 
 #[test]
 fn direct_light_is_one_scattering_and_less_than_all() {
-    let scene = common::curtain_room(
-        Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35),
-        40,
-    );
+    let scene = common::curtain_room(even_lace(), 40);
     for backend in backends() {
         let settings = small(32, backend);
         let all = mean(&picture(&scene, &settings, backend));
@@ -278,10 +277,7 @@ fn sun_disc_and_point_light_give_their_irradiance() {
 
 #[test]
 fn a_marked_window_changes_the_noise_and_not_the_mean() {
-    let marked = curtain_room(
-        Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35),
-        60,
-    );
+    let marked = curtain_room(even_lace(), 60);
     let mut unmarked = marked.clone();
     unmarked.portals.clear();
     for integrator in [Integrator::Direct, Integrator::Path] {

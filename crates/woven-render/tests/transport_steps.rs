@@ -3,20 +3,17 @@
 
 mod common;
 
-use common::{curtain_room, mean, pleats};
+use common::{curtain_room, even_lace, mean, pleats};
 use glam::Vec3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use woven_render::accumulate::Accumulation;
 use woven_render::render::{Backend, Progress, Renderer, Settings, render};
-use woven_render::scene::{Material, Scene};
+use woven_render::scene::Scene;
 
 fn scene() -> Scene {
-    curtain_room(
-        Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35),
-        40,
-    )
+    curtain_room(even_lace(), 40)
 }
 
 fn settings() -> Settings {

@@ -12,12 +12,14 @@ use woven_render::atomic::write_atomically;
 use woven_render::render::Renderer;
 use woven_render::scene::gltf::{Limits, motion};
 use woven_render::scene::{Mesh, Scene};
+use woven_render::shutter::Pose;
 
 /// Render a scene in which one mesh moves.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Examples:
   woven-render animate room.glb --cloth wind.glb --frames 0..48 -o frames
   woven-render animate room.glb --cloth wind.pc2 --mesh curtain --frames 0..=9 -o frames --format png --denoise --spp 16
+  woven-render animate room.glb --cloth wind.glb --frames 0..48 -o frames --shutter 0.5
 
 A frame that exists and was made with the same settings is kept, so the same command goes on where it was stopped.")]
 pub(crate) struct AnimateArgs {
@@ -35,6 +37,10 @@ pub(crate) struct AnimateArgs {
     /// Folder for frame_0000.exr, ...; made if it is not there.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// How long the shutter is open, as a share of the time from frame to frame, around the frame's own moment; the mesh
+    /// blurs. 0.5 is a film camera's 180 degrees.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    shutter: f32,
     /// Format of the frames.
     #[arg(long, value_parser = ["exr", "png"], default_value = "exr")]
     format: String,
@@ -79,6 +85,11 @@ struct Ledger {
 
 /// Renders all frames that are not there yet.
 pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
+    ensure!(
+        (0.0..=1.0).contains(&args.shutter),
+        "--shutter {} is no share of the time from frame to frame; give a number from 0 to 1",
+        args.shutter
+    );
     std::fs::create_dir_all(&args.output)
         .with_context(|| format!("cannot make the folder {}", args.output.display()))?;
     let ledger_path = args.output.join("frames.json");
@@ -101,6 +112,10 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
     )?;
     job.metadata
         .insert("cloth.sha256".to_owned(), cache.hash.clone());
+    if args.shutter > 0.0 {
+        job.metadata
+            .insert("shutter".to_owned(), args.shutter.to_string());
+    }
 
     // The ray structure is built for the cache's first frame and refitted from there, wherever a run begins: the same
     // frame has the same bytes in every run.
@@ -117,6 +132,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
                     &job.hash,
                     &cache.hash,
                     &job.scene.meshes[moving].name,
+                    args.shutter,
                     k,
                 ))
                 || !args.output.join(&name).is_file()
@@ -133,12 +149,17 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
     let started = Instant::now();
     let mut renderer = Renderer::new(&job.scene, &job.settings, job.backend)?;
     let mut frame: Mesh = job.scene.meshes[moving].clone();
-    let mut before: Mesh = frame.clone();
+    let mut other: Mesh = frame.clone();
     for (done, &k) in todo.iter().enumerate() {
         let left = left(started, done, todo.len());
         bar.word(&format!("frame {k} ({} of {}{left})", done + 1, todo.len()));
         cache.apply(k, &mut frame)?;
-        renderer.move_mesh(moving, &frame.positions, &frame.normals)?;
+        if args.shutter > 0.0 {
+            let poses = poses(&cache, k, &frame, &mut other, args.shutter)?;
+            renderer.open_shutter(moving, poses)?;
+        } else {
+            renderer.move_mesh(moving, &frame.positions, &frame.normals)?;
+        }
         renderer.set_seed(job.settings.seed.wrapping_add(k as u32))?;
         renderer.finish(&mut bar)?;
         if bar.stopped() && renderer.samples() < job.settings.spp {
@@ -148,12 +169,13 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
                 kept + done
             );
         }
-        let hash = frame_hash(&job.hash, &cache.hash, &frame.name, k);
+        let hash = frame_hash(&job.hash, &cache.hash, &frame.name, args.shutter, k);
         let mut film = renderer.film()?;
         if args.render.aov {
             // From the frame before in the cache, whether this run has rendered it or not.
-            cache.apply(k.saturating_sub(1), &mut before)?;
-            film.push("motion", renderer.motion(moving, &before.positions)?);
+            cache.apply(k.saturating_sub(1), &mut other)?;
+            renderer.move_mesh(moving, &frame.positions, &frame.normals)?;
+            film.push("motion", renderer.motion(moving, &other.positions)?);
         }
         setup::finish(&mut film, &args.render, &job.metadata, &hash)?;
         film.metadata.insert("frame".to_owned(), k.to_string());
@@ -205,11 +227,39 @@ fn file_name(k: usize, format: &str) -> String {
     format!("frame_{k:04}.{format}")
 }
 
-fn frame_hash(settings: &str, cache: &str, mesh: &str, k: usize) -> String {
+fn frame_hash(settings: &str, cache: &str, mesh: &str, shutter: f32, k: usize) -> String {
     use sha2::Digest;
     setup::hex(&sha2::Sha256::digest(format!(
-        "{settings} {cache} {mesh} {k}"
+        "{settings} {cache} {mesh} {shutter} {k}"
     )))
+}
+
+/// Where the mesh is when the shutter opens, at the frame's own moment, and when it closes: half of `shutter` before and
+/// after, on the straight way to the frames beside. Before the first frame and after the last one it goes on as it went.
+fn poses(
+    cache: &motion::Motion,
+    k: usize,
+    frame: &Mesh,
+    other: &mut Mesh,
+    shutter: f32,
+) -> Result<Vec<Pose>> {
+    let pose = |m: &Mesh| Pose {
+        positions: m.positions.clone(),
+        normals: m.normals.clone(),
+    };
+    let now = pose(frame);
+    let mut beside = |there: Option<usize>, back: Option<usize>| -> Result<Pose> {
+        let (k, t) = match (there, back) {
+            (Some(k), _) => (k, 0.5 * shutter),
+            (None, Some(k)) => (k, -0.5 * shutter),
+            (None, None) => return Ok(now.clone()),
+        };
+        cache.apply(k, other)?;
+        Ok(now.towards(&pose(other), t))
+    };
+    let (before, after) = (k.checked_sub(1), Some(k + 1).filter(|&k| k < cache.frames));
+    let (opens, closes) = (beside(before, after)?, beside(after, before)?);
+    Ok(vec![opens, now, closes])
 }
 
 fn write_ledger(path: &Path, ledger: &Ledger) -> Result<()> {

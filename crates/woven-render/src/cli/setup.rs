@@ -108,6 +108,7 @@ pub(crate) fn prepare(scene_path: &Path, args: &RenderArgs) -> Result<Job> {
             IntegratorArg::Direct => Integrator::Direct,
         },
         light_layers: args.light_layers,
+        event_layers: args.event_layers,
         // The denoiser is led by them.
         aov: args.aov || args.denoise,
         time_limit: args

@@ -1,18 +1,21 @@
 //! Choosing a light and a direction to it, and the density with which that is done. The pair of `shader/light.wgsl`.
 //!
-//! With few lights each is weighed at the shading point; with many they are chosen by power. A matt surface takes the
-//! light of rectangles and of the sky from these samples alone; triangles and glossy surfaces share them with
-//! scattering by multiple importance sampling (Veach 1997, power heuristic).
+//! With few lights each is weighed at the shading point; with many those that have a place are found through a tree of
+//! clusters (`table/tree.rs`), whose root is weighed like one light. A matt surface takes the light of rectangles and of the
+//! sky from these samples alone; triangles and glossy surfaces share them with scattering by multiple importance sampling
+//! (Veach 1997, power heuristic).
 
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
 use super::math::{acos, atan2, luminance, sincos};
 use super::rect::{self, Part, WHOLE};
-use super::surface;
-use crate::table::{DOUBLE_SIDED, LightRow, NONE, POINT, RECT, SKY, SPOT, SUN, TRIANGLE, Table};
+use super::{surface, tree};
+use crate::table::{
+    CLUSTER, DOUBLE_SIDED, LightRow, NONE, POINT, RECT, SKY, SPOT, SUN, TRIANGLE, Table,
+};
 
-/// Up to this many lights are weighed at each point.
+/// Up to this many lights are weighed one by one at each point.
 pub(crate) const WEIGHED: u32 = 16;
 
 /// A point that looks for light.
@@ -25,7 +28,7 @@ pub(crate) struct Place {
     pub transmits: bool,
     /// In front of every portal.
     pub inside: bool,
-    /// Sum of the weights of all lights.
+    /// Sum of the weights of all lights, or of the root and the lights without a place.
     pub total: f32,
 }
 
@@ -59,14 +62,29 @@ pub(crate) fn place(table: &Table, p: Vec3, n: Vec3, transmits: bool) -> Place {
         inside,
         total: 0.0,
     };
-    if g.lights > WEIGHED {
-        place.total = 1.0;
-    } else {
-        for i in 0..g.lights {
-            place.total += weight(table, &place, i);
-        }
+    for k in 0..candidates(table) {
+        place.total += weight(table, &place, candidate(table, k));
     }
     place
+}
+
+/// How many rows are weighed at every point: all lights, or the root of the tree and the lights without a place.
+fn candidates(table: &Table) -> u32 {
+    let g = &table.globals;
+    if g.tree == NONE {
+        g.lights
+    } else {
+        1 + g.lights - g.others
+    }
+}
+
+fn candidate(table: &Table, k: u32) -> u32 {
+    let g = &table.globals;
+    match (g.tree, k) {
+        (NONE, _) => k,
+        (root, 0) => root,
+        _ => g.others + k - 1,
+    }
 }
 
 /// The part of a rectangular light that can be seen at all: in a room with windows, of a light outside, what shows
@@ -87,7 +105,7 @@ fn part(table: &Table, at: &Place, r: &LightRow) -> Part {
 }
 
 /// What the light is expected to give at the place, not counting what stands between.
-fn weight(table: &Table, at: &Place, i: u32) -> f32 {
+pub(super) fn weight(table: &Table, at: &Place, i: u32) -> f32 {
     let g = &table.globals;
     let r = &table.lights[i as usize];
     let lum = luminance(Vec3::from(r.radiance));
@@ -101,6 +119,11 @@ fn weight(table: &Table, at: &Place, i: u32) -> f32 {
                 & DOUBLE_SIDED
                 != 0;
             if !two && (at.p - Vec3::from(r.p)).dot(n) <= 0.0 {
+                return 0.0;
+            }
+            // All of it behind a surface that lets nothing through.
+            let rise = |edge: [f32; 3]| at.n.dot(Vec3::from(edge)).max(0.0);
+            if !at.transmits && at.n.dot(Vec3::from(r.p) - at.p) + rise(r.u) + rise(r.v) <= 0.0 {
                 return 0.0;
             }
             let d2 = to.length_squared().max(1e-12);
@@ -118,9 +141,14 @@ fn weight(table: &Table, at: &Place, i: u32) -> f32 {
             lum * cos.abs().max(0.05)
         }
         SKY => g.sky_scale[3] * if at.inside { windows(table, at.p) } else { PI },
+        CLUSTER => tree::weight(table, at, r),
         _ => {
-            let d2 = (Vec3::from(r.p) - at.p).length_squared().max(1e-6);
-            lum / d2
+            let to = Vec3::from(r.p) - at.p;
+            let d2 = to.length_squared().max(1e-6);
+            let hidden = !at.transmits && to.dot(at.n) <= 0.0;
+            // Outside of its cone.
+            let dark = r.kind == SPOT && -to.dot(n) <= r.v[1] * d2.sqrt();
+            if hidden || dark { 0.0 } else { lum / d2 }
         }
     }
 }
@@ -167,42 +195,55 @@ fn windows(table: &Table, p: Vec3) -> f32 {
 
 /// Picks a light by `u[0]` and a direction to it by the other two.
 pub(crate) fn sample(table: &Table, at: &Place, u: [f32; 3]) -> Option<Sample> {
+    let (chosen, share) = choose(table, at, u[0])?;
+    towards(table, at, chosen, share, u[1], u[2])
+}
+
+/// A light by `u`, and the probability with which it is chosen.
+pub(super) fn choose(table: &Table, at: &Place, u: f32) -> Option<(u32, f32)> {
     let g = &table.globals;
     if g.lights == 0 || at.total <= 0.0 {
         return None;
     }
     let mut chosen = NONE;
     let mut share = 0.0;
-    let mut rest = u[0] * at.total;
-    if g.lights > WEIGHED {
-        let (mut lo, mut hi) = (0, g.lights - 1);
-        while lo < hi {
-            let middle = (lo + hi) / 2;
-            if table.lights[middle as usize].cumulative > u[0] {
-                hi = middle;
-            } else {
-                lo = middle + 1;
+    let mut rest = u * at.total;
+    for k in 0..candidates(table) {
+        let i = candidate(table, k);
+        let w = weight(table, at, i);
+        if w > 0.0 {
+            chosen = i;
+            share = w / at.total;
+            if rest < w {
+                rest /= w;
+                break;
             }
         }
-        chosen = lo;
-        share = power_share(table, lo);
-    } else {
-        for i in 0..g.lights {
-            let w = weight(table, at, i);
-            if w > 0.0 {
-                chosen = i;
-                share = w / at.total;
-                if rest < w {
-                    break;
-                }
-            }
-            rest -= w;
-        }
+        rest -= w;
     }
-    if chosen == NONE || share <= 0.0 {
+    if chosen == NONE {
         return None;
     }
-    towards(table, at, chosen, share, u[1], u[2])
+    // Down the tree; what is left of the number chooses on.
+    while chosen >= g.lights {
+        let r = &table.lights[chosen as usize];
+        let (a, b) = (weight(table, at, r.place), weight(table, at, r.layer));
+        if a + b <= 0.0 {
+            return None;
+        }
+        let part = a / (a + b);
+        rest = rest.clamp(0.0, 0.999_999_94);
+        if rest < part {
+            chosen = r.place;
+            share *= part;
+            rest /= part;
+        } else {
+            chosen = r.layer;
+            share *= b / (a + b);
+            rest = (rest - part) / (1.0 - part);
+        }
+    }
+    (share > 0.0).then_some((chosen, share))
 }
 
 /// Light `i` is sampled by area, which is poor from near by: scattering helps even on matt surfaces.
@@ -211,13 +252,28 @@ pub(crate) fn soft(table: &Table, i: u32) -> bool {
     r.kind == TRIANGLE || (r.kind == RECT && r.area < 0.0)
 }
 
-fn power_share(table: &Table, i: u32) -> f32 {
-    let before = if i > 0 {
-        table.lights[i as usize - 1].cumulative
-    } else {
-        0.0
-    };
-    table.lights[i as usize].cumulative - before
+/// Probability with which [`choose`] finds light `i`.
+pub(super) fn share(table: &Table, at: &Place, i: u32) -> f32 {
+    if at.total <= 0.0 {
+        return 0.0;
+    }
+    // Up the tree.
+    let mut me = i;
+    let mut share = 1.0;
+    loop {
+        let mine = weight(table, at, me);
+        let parent = table.lights[me as usize].parent;
+        if mine <= 0.0 {
+            return 0.0;
+        }
+        if parent == NONE {
+            return share * mine / at.total;
+        }
+        let r = &table.lights[parent as usize];
+        let other = if r.place == me { r.layer } else { r.place };
+        share *= mine / (mine + weight(table, at, other));
+        me = parent;
+    }
 }
 
 /// A direction to light `i`, which was chosen with probability `share`.
@@ -318,15 +374,7 @@ fn towards(table: &Table, at: &Place, i: u32, share: f32, u: f32, v: f32) -> Opt
 
 /// Density with which [`sample`] finds light `i` in direction `wi` at `distance`.
 pub(crate) fn density(table: &Table, at: &Place, i: u32, wi: Vec3, distance: f32) -> f32 {
-    let g = &table.globals;
-    if at.total <= 0.0 {
-        return 0.0;
-    }
-    let share = if g.lights > WEIGHED {
-        power_share(table, i)
-    } else {
-        weight(table, at, i) / at.total
-    };
+    let share = share(table, at, i);
     if share <= 0.0 {
         return 0.0;
     }

@@ -14,7 +14,9 @@ use super::math::luminance;
 use super::surface::{self, Surface};
 use crate::rng::Rng;
 use crate::scene::LAYERS;
-use crate::table::{MATT, MaterialRow, NONE, TRANSMITS, Table};
+use crate::table::{
+    EMITTED, MATT, MaterialRow, NONE, PASSED, REFLECTED, TRANSMITS, TRANSMITTED, Table,
+};
 
 /// Sheets at which a camera ray is lit (random numbers: set 0 is the camera's, then one set a crossing); beyond it goes
 /// on dark (the product of as many gaps is below any noise).
@@ -70,6 +72,28 @@ pub(super) struct Vertex {
     pub wo: Vec3,
     /// What is scattered here reaches the eye times this.
     pub throughput: Vec3,
+    /// The first sheet that the camera's ray meets.
+    front: bool,
+}
+
+impl Vertex {
+    /// Layer of what comes from direction `wi` (in the sheet's frame) and is scattered here, with `Globals::events`.
+    pub(super) fn event(&self, wi: Vec3) -> u32 {
+        match (self.front, wi.z * self.wo.z > 0.0) {
+            (false, _) => PASSED,
+            (true, true) => REFLECTED,
+            (true, false) => TRANSMITTED,
+        }
+    }
+}
+
+/// The layer by event if these are asked for, else that of the light.
+pub(super) fn layer(table: &Table, event: u32, light: u32) -> u32 {
+    if table.globals.events == 0 {
+        light
+    } else {
+        event
+    }
 }
 
 /// Where a camera ray is scattered: its first sheet, and one of those behind for all of them.
@@ -222,13 +246,14 @@ pub(super) fn begin(
     let mut pick = rng.coin();
     for crossing in 0..CROSSINGS {
         let Some(hit) = nearest(table, &ray, tmin, FAR) else {
+            let straight = |light| layer(table, PASSED, light);
             add(
                 &mut out.direct,
-                table.globals.sky_layer,
+                straight(table.globals.sky_layer),
                 light::sky(table, ray.d) * passed,
             );
-            light::discs(table, ray.d, |layer, l| {
-                add(&mut out.direct, layer, l * passed);
+            light::discs(table, ray.d, |light, l| {
+                add(&mut out.direct, straight(light), l * passed);
             });
             break;
         };
@@ -236,9 +261,10 @@ pub(super) fn begin(
         let m = &table.materials[s.material as usize];
         let wo = s.local(-ray.d);
         let gap = surface::gap(table, m, &s, ray.d);
+        let given = if crossing == 0 { EMITTED } else { PASSED };
         add(
             &mut out.direct,
-            m.layer,
+            layer(table, given, m.layer),
             surface::emission(table, m, &s, -ray.d) * (passed * (1.0 - gap)),
         );
         let albedo = m.emission[3] * luminance(s.tint);
@@ -251,15 +277,21 @@ pub(super) fn begin(
         if weight > 0.0 && view.depth > 0 {
             let at = place(table, m, &s, ray.d);
             let u = rng.set(1 + crossing);
-            if let Some((l, value)) = incident(table, m, &s, &at, wo, u, &mut rng) {
-                add(&mut out.direct, l.layer, value * passed);
-            }
             let vertex = Vertex {
                 s,
                 at,
                 wo,
                 throughput: Vec3::splat(passed),
+                front: crossing == 0,
             };
+            if let Some((l, value)) = incident(table, m, &s, &at, wo, u, &mut rng) {
+                let event = vertex.event(s.local(l.wi));
+                add(
+                    &mut out.direct,
+                    layer(table, event, l.layer),
+                    value * passed,
+                );
+            }
             if found[0].is_none() {
                 found[0] = Some(vertex);
                 front = weight;
@@ -341,6 +373,7 @@ fn follow(
     // What the path carries from the second point on, and whether other paths may have it.
     let mut tail = Vec3::ONE;
     let mut lent = false;
+    let mut event = PASSED;
     for bounce in 1..=view.depth {
         let m = &table.materials[v.s.material as usize];
         let mixed = shares(m);
@@ -370,6 +403,9 @@ fn follow(
             v.throughput *= kept;
         }
         let d = v.s.world(wi);
+        if bounce == 1 {
+            event = first.event(wi);
+        }
         let away = wi.z.abs() / pdf * kept;
         if let (2, Some(y)) = (bounce, &mut second) {
             y.wi = d;
@@ -380,10 +416,13 @@ fn follow(
         let ray = Ray::new(v.s.leave(table, d), d);
         let mut tmin = 0.0;
         let mut passed = 1.0;
-        let mut give = |layer: u32, value: Vec3, tail: Vec3, alone: Vec3| match &mut second {
-            Some(y) if lent => add(&mut y.beyond, layer, value * tail),
-            Some(_) => add(&mut own.indirect, layer, value * alone),
-            None => add(&mut own.direct, layer, value * alone),
+        let mut give = |light: u32, value: Vec3, tail: Vec3, alone: Vec3| {
+            let own_layer = layer(table, event, light);
+            match &mut second {
+                Some(y) if lent => add(&mut y.beyond, light, value * tail),
+                Some(_) => add(&mut own.indirect, own_layer, value * alone),
+                None => add(&mut own.direct, own_layer, value * alone),
+            }
         };
         // Straight on through gaps, each by a coin.
         let (hit, s, gap) = loop {
@@ -454,6 +493,7 @@ fn follow(
             at,
             wo,
             throughput: v.throughput,
+            front: false,
         };
     }
     second

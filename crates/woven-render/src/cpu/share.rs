@@ -116,14 +116,18 @@ fn gather(table: &Table, group: &mut [Option<Begun>; GROUP], coins: &[f32; GROUP
         let m = &table.materials[y.s.material as usize];
         for (sights, begun) in sights.iter().zip(group.iter_mut()) {
             let Some(begun) = begun else { continue };
-            for sight in sights.iter().filter(|s| s.density > 0.0) {
+            for (which, sight) in sights.iter().enumerate().filter(|s| s.1.density > 0.0) {
+                // By event all that comes this way is of one layer.
+                let event =
+                    begun.firsts[which].map_or(0, |x| x.vertex.event(x.vertex.s.local(sight.d)));
+                let into = |light: usize| path::layer(table, event, light as u32) as usize;
                 let carry = sight.carry * (1.0 / (q * all));
                 let wo = y.s.local(-sight.d);
                 let light = &mut begun.sample.indirect;
-                light[y.lit.layer as usize] += y.lit.scattered(table, m, &y.s, wo) * carry;
+                light[into(y.lit.layer as usize)] += y.lit.scattered(table, m, &y.s, wo) * carry;
                 let f = surface::evaluate(table, m, &y.s, y.s.local(y.wi), wo) * carry;
-                for (sum, &beyond) in light.iter_mut().zip(&y.beyond) {
-                    *sum += f * beyond;
+                for (k, &beyond) in y.beyond.iter().enumerate() {
+                    light[into(k)] += f * beyond;
                 }
             }
         }

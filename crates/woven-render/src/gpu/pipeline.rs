@@ -22,6 +22,7 @@ pub fn source() -> String {
         include_str!("../shader/surface.wgsl"),
         include_str!("../shader/bvh.wgsl"),
         include_str!("../shader/rect.wgsl"),
+        include_str!("../shader/tree.wgsl"),
         include_str!("../shader/light.wgsl"),
         include_str!("../shader/path.wgsl"),
         include_str!("../shader/share.wgsl"),

@@ -1,7 +1,5 @@
 // Choosing a light and a direction to it, and the density of that; the pair of cpu/light.rs.
 
-const WEIGHED: u32 = 16u;
-
 struct Place {
     p: vec3<f32>,
     n: vec3<f32>,
@@ -28,14 +26,26 @@ fn light_place(p: vec3<f32>, n: vec3<f32>, transmits: bool) -> Place {
         inside = inside && dot(p - lights[first + i].p, lights[first + i].n) > 0.0;
     }
     var place = Place(p, n, transmits, inside, 0.0);
-    if (first > WEIGHED) {
-        place.total = 1.0;
-    } else {
-        for (var i = 0u; i < first; i++) {
-            place.total += light_weight(place, i);
-        }
+    let count = light_candidates();
+    for (var k = 0u; k < count; k++) {
+        place.total += light_weight(place, light_candidate(k));
     }
     return place;
+}
+
+// Rows that are weighed at every point: all lights, or the root of the tree and the lights without a place.
+fn light_candidates() -> u32 {
+    if (frame.globals.tree == NONE) {
+        return frame.globals.lights;
+    }
+    return 1u + frame.globals.lights - frame.globals.others;
+}
+
+fn light_candidate(k: u32) -> u32 {
+    if (frame.globals.tree == NONE) {
+        return k;
+    }
+    return select(frame.globals.others + k - 1u, frame.globals.tree, k == 0u);
 }
 
 // The part of a rectangular light that can be seen at all: in a room with windows, of a light outside, what shows
@@ -80,6 +90,11 @@ fn light_weight(at: Place, i: u32) -> f32 {
         if (!two && dot(at.p - lights[i].p, n) <= 0.0) {
             return 0.0;
         }
+        // All of it behind a surface that lets nothing through.
+        let rise = max(dot(at.n, lights[i].u), 0.0) + max(dot(at.n, lights[i].v), 0.0);
+        if (!at.transmits && dot(at.n, lights[i].p - at.p) + rise <= 0.0) {
+            return 0.0;
+        }
         let d2 = max(length2(to), 1e-12);
         let c = abs(dot(to, n)) / sqrt(d2);
         let area = abs(lights[i].area) * part_size(part);
@@ -103,7 +118,15 @@ fn light_weight(at: Place, i: u32) -> f32 {
         }
         return frame.globals.sky_scale.w * angle;
     }
-    return lum / max(length2(lights[i].p - at.p), 1e-6);
+    if (kind == CLUSTER) {
+        return cluster_weight(at, i);
+    }
+    let to = lights[i].p - at.p;
+    let d2 = max(length2(to), 1e-6);
+    let hidden = !at.transmits && dot(to, at.n) <= 0.0;
+    // Outside of its cone.
+    let dark = kind == SPOT && -dot(to, n) <= lights[i].v.y * sqrt(d2);
+    return select(lum / d2, 0.0, hidden || dark);
 }
 
 fn leads_out(p: vec3<f32>, d: vec3<f32>, spread: f32) -> bool {
@@ -150,40 +173,53 @@ fn no_light() -> LightSample {
 }
 
 fn light_sample(at: Place, u: vec3<f32>) -> LightSample {
-    let count = frame.globals.lights;
-    if (count == 0u || at.total <= 0.0) {
+    if (frame.globals.lights == 0u || at.total <= 0.0) {
         return no_light();
     }
     var chosen = NONE;
     var share = 0.0;
     var rest = u.x * at.total;
-    if (count > WEIGHED) {
-        var lo = 0u;
-        var hi = count - 1u;
-        while (lo < hi) {
-            let middle = (lo + hi) / 2u;
-            if (lights[middle].cumulative > u.x) {
-                hi = middle;
-            } else {
-                lo = middle + 1u;
+    let count = light_candidates();
+    for (var k = 0u; k < count; k++) {
+        let i = light_candidate(k);
+        let w = light_weight(at, i);
+        if (w > 0.0) {
+            chosen = i;
+            share = w / at.total;
+            if (rest < w) {
+                rest /= w;
+                break;
             }
         }
-        chosen = lo;
-        share = power_share(lo);
-    } else {
-        for (var i = 0u; i < count; i++) {
-            let w = light_weight(at, i);
-            if (w > 0.0) {
-                chosen = i;
-                share = w / at.total;
-                if (rest < w) {
-                    break;
-                }
-            }
-            rest -= w;
+        rest -= w;
+    }
+    if (chosen == NONE) {
+        return no_light();
+    }
+    // Down the tree; what is left of the number chooses on.
+    while (chosen >= frame.globals.lights) {
+        let halves = vec2<u32>(lights[chosen].place, lights[chosen].layer);
+        var w = vec2<f32>(0.0);
+        for (var k = 0u; k < 2u; k++) {
+            w[k] = light_weight(at, halves[k]);
+        }
+        let both = w.x + w.y;
+        if (both <= 0.0) {
+            return no_light();
+        }
+        let part = w.x / both;
+        rest = clamp(rest, 0.0, 0.99999994);
+        if (rest < part) {
+            chosen = halves.x;
+            share *= part;
+            rest /= part;
+        } else {
+            chosen = halves.y;
+            share *= w.y / both;
+            rest = (rest - part) / (1.0 - part);
         }
     }
-    if (chosen == NONE || share <= 0.0) {
+    if (share <= 0.0) {
         return no_light();
     }
     return light_towards(at, chosen, share, u.y, u.z);
@@ -193,12 +229,31 @@ fn soft(i: u32) -> bool {
     return lights[i].kind == TRIANGLE || (lights[i].kind == RECT && lights[i].area < 0.0);
 }
 
-fn power_share(i: u32) -> f32 {
-    var before = 0.0;
-    if (i > 0u) {
-        before = lights[i - 1u].cumulative;
+// Probability with which light_sample chooses light i: up the tree, each half and its other.
+fn light_share(at: Place, i: u32) -> f32 {
+    var me = i;
+    var other = i;
+    var mine = 0.0;
+    var share = 1.0;
+    loop {
+        let w = light_weight(at, other);
+        if (other == me) {
+            mine = w;
+            if (mine <= 0.0) {
+                return 0.0;
+            }
+            let parent = lights[me].parent;
+            if (parent == NONE) {
+                break;
+            }
+            other = select(lights[parent].place, lights[parent].layer, lights[parent].place == me);
+        } else {
+            share *= mine / (mine + w);
+            me = lights[me].parent;
+            other = me;
+        }
     }
-    return lights[i].cumulative - before;
+    return share * mine / at.total;
 }
 
 fn light_towards(at: Place, i: u32, share: f32, u1: f32, v1: f32) -> LightSample {
@@ -265,12 +320,7 @@ fn light_density(at: Place, i: u32, wi: vec3<f32>, distance: f32) -> f32 {
     if (at.total <= 0.0) {
         return 0.0;
     }
-    var share: f32;
-    if (frame.globals.lights > WEIGHED) {
-        share = power_share(i);
-    } else {
-        share = light_weight(at, i) / at.total;
-    }
+    let share = light_share(at, i);
     if (share <= 0.0) {
         return 0.0;
     }

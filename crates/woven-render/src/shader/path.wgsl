@@ -8,6 +8,18 @@ struct Vertex {
     at: Place,
     wo: vec3<f32>,
     throughput: vec3<f32>,
+    // The first sheet that the camera's ray meets.
+    front: bool,
+}
+
+// Layer of what comes from direction wi (in the sheet's frame) and is scattered towards wo, with Globals.events.
+fn event_of(front: bool, wi: vec3<f32>, wo: vec3<f32>) -> u32 {
+    return select(PASSED, select(TRANSMITTED, REFLECTED, wi.z * wo.z > 0.0), front);
+}
+
+// The layer by event if these are asked for, else that of the light.
+fn layer_of(event: u32, light: u32) -> u32 {
+    return select(event, light, frame.globals.events == 0u);
 }
 
 struct Second {
@@ -151,6 +163,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
     var tail = vec3<f32>(1.0);
     var lent = false;
     var passed = 1.0;
+    var event = PASSED;
     loop {
         let hit = nearest(ray, tmin, FAR);
         let miss = hit.place == EMPTY;
@@ -194,10 +207,13 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
                     }
                 }
             }
+            if (camera) {
+                event = select(PASSED, EMITTED, bounce == 0u && !miss);
+            }
             if (lent) {
                 add_beyond(&second, layer, given * tail * share);
             } else {
-                add_light(&out, begun.has_second, layer, given * carry * share);
+                add_light(&out, begun.has_second, layer_of(event, layer), given * carry * share);
             }
         }
         var scatter = false;
@@ -229,6 +245,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
                 let lit = incident(s.material, s, at, wo, u, &numbers);
                 if (camera) {
                     rng = numbers;
+                    event = event_of(bounce == 0u, local(s, lit.wi), wo);
                 } else {
                     *paths = numbers;
                     // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
@@ -246,10 +263,10 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
                 } else if (lent) {
                     add_beyond(&second, lit.layer, lit.value * tail);
                 } else {
-                    add_light(&out, begun.has_second, lit.layer, lit.value * carry);
+                    add_light(&out, begun.has_second, layer_of(event, lit.layer), lit.value * carry);
                 }
                 if (camera) {
-                    let vertex = Vertex(s, at, wo, carry);
+                    let vertex = Vertex(s, at, wo, carry, bounce == 0u);
                     if (front <= 0.0) {
                         firsts[0] = vertex;
                         front = weight;
@@ -266,7 +283,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
                         }
                     }
                 } else {
-                    v = Vertex(s, at, wo, carry);
+                    v = Vertex(s, at, wo, carry, false);
                     scatter = true;
                 }
             }
@@ -336,6 +353,9 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
             carry *= kept;
         }
         let d = world(v.s, b.wi);
+        if (bounce == 1u) {
+            event = event_of(v.front, b.wi, v.wo);
+        }
         let away = abs(b.wi.z) / pdf * kept;
         if (bounce == 2u) {
             second.wi = d;
@@ -354,7 +374,7 @@ fn begin(x: u32, y: u32, paths: ptr<function, Rng>) -> Begun {
 fn add_discs(out: ptr<function, Taken>, d: vec3<f32>, passed: f32) {
     for (var i = frame.globals.others; i < frame.globals.lights; i++) {
         if (lights[i].kind == SUN && lights[i].u.y > 1e-4 && dot(d, lights[i].n) > lights[i].u.x) {
-            add_light(out, false, lights[i].layer, lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
+            add_light(out, false, layer_of(PASSED, lights[i].layer), lights[i].radiance * (1.0 / (PI * lights[i].u.y * lights[i].u.y)) * passed);
         }
     }
 }

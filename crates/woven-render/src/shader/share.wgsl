@@ -42,6 +42,7 @@ struct FirstRow {
     // Probability with which the path begins here; 0: there is no such point.
     share: f32,
     throughput: vec3<f32>,
+    front: u32,
 }
 
 struct SecondRow {
@@ -108,6 +109,7 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
         slots[slot].firsts[k].point = point_of(b.firsts[k].s);
         slots[slot].firsts[k].wo = b.firsts[k].wo;
         slots[slot].firsts[k].throughput = b.firsts[k].throughput;
+        slots[slot].firsts[k].front = u32(b.firsts[k].front);
     }
     slots[slot].chosen = b.chosen;
     if (!b.has_second) {
@@ -246,6 +248,8 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
             let x = surface_of(slots[slot].firsts[which].point);
             let to = s.p - leave(x, s.p - x.p);
             let wo = local(s, to * (-1.0 / sqrt(max(length2(to), 1e-12))));
+            // By event all that comes this way is of one layer.
+            let event = event_of(slots[slot].firsts[which].front == 1u, local(x, to), slots[slot].firsts[which].wo);
             // Light that was sampled there, then what the path found beyond: one place for the scattering.
             for (var part = 0u; part < 2u; part++) {
                 let wi = local(s, select(slots[i].second.wi, slots[i].second.lit_wi, part == 0u));
@@ -255,11 +259,11 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
                     if (slots[i].second.pdf > 0.0) {
                         value *= heuristic(slots[i].second.pdf, b.pdf);
                     }
-                    light[slots[i].second.layer] += value * carry;
+                    light[layer_of(event, slots[i].second.layer)] += value * carry;
                 } else {
                     let f = b.f * carry;
                     for (var k = 0u; k < LAYERS; k++) {
-                        light[k] += f * slots[i].second.beyond[k].xyz;
+                        light[layer_of(event, k)] += f * slots[i].second.beyond[k].xyz;
                     }
                 }
             }

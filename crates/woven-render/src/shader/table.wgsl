@@ -22,6 +22,12 @@ const PLAIN_GLOSS: u32 = 32u;
 const MEASURED: u32 = 64u;
 const MULTIPLIES: u32 = 128u;
 
+// Layers with Globals.events
+const REFLECTED: u32 = 0u;
+const TRANSMITTED: u32 = 1u;
+const PASSED: u32 = 2u;
+const EMITTED: u32 = 3u;
+
 // LightRow.kind
 const RECT: u32 = 0u;
 const TRIANGLE: u32 = 1u;
@@ -29,6 +35,7 @@ const SUN: u32 = 2u;
 const POINT: u32 = 3u;
 const SPOT: u32 = 4u;
 const SKY: u32 = 5u;
+const CLUSTER: u32 = 7u;
 
 struct Node {
     lo: array<vec4<f32>, 3>,
@@ -86,7 +93,7 @@ struct LightRow {
     n: vec3<f32>,
     area: f32,
     radiance: vec3<f32>,
-    cumulative: f32,
+    parent: u32,
 }
 
 struct Globals {
@@ -103,7 +110,9 @@ struct Globals {
     offset: f32,
     taps: u32,
     others: u32,
-    spare: array<u32, 3>,
+    tree: u32,
+    events: u32,
+    spare: u32,
 }
 
 struct Frame {

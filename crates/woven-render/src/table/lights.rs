@@ -1,12 +1,13 @@
-//! The lights' rows: emissive meshes as rectangles and triangles, sun, points, the environment, then the windows.
+//! The lights' rows: emissive meshes as rectangles and triangles, points, suns, the environment; then the windows, then
+//! clusters of the lights with a place.
 
 use crate::bvh::EMPTY;
-use crate::cpu::math::luminance;
+use crate::cpu::light::WEIGHED;
 use crate::scene::{LAYERS, Light, Portal, Scene};
 use glam::Vec3;
 
 use super::{
-    DOUBLE_SIDED, EMITS, LightRow, NONE, POINT, PORTAL, RECT, SKY, SPOT, SUN, TRIANGLE, Table,
+    CLUSTER, EMITS, LightRow, NONE, POINT, PORTAL, RECT, SKY, SPOT, SUN, TRIANGLE, Table, tree,
 };
 
 /// Fills `table.lights`, the light of each triangle, and the globals' counts.
@@ -19,8 +20,9 @@ pub(super) fn fill(table: &mut Table, scene: &Scene, light_layers: bool) {
         }
     };
     let mut rows = emitters(table);
-    table.globals.others = rows.len() as u32;
-    for light in &scene.lights {
+    let sun = |l: &&Light| matches!(l, Light::Sun { .. });
+    let lamps = scene.lights.iter().filter(|l| !sun(l));
+    for light in lamps.chain(scene.lights.iter().filter(sun)) {
         rows.push(match *light {
             Light::Sun {
                 direction,
@@ -76,7 +78,6 @@ pub(super) fn fill(table: &mut Table, scene: &Scene, light_layers: bool) {
         });
     }
     if table.globals.sky_width > 0 {
-        table.globals.sky_light = rows.len() as u32;
         rows.push(LightRow {
             kind: SKY,
             layer: table.globals.sky_layer,
@@ -84,30 +85,56 @@ pub(super) fn fill(table: &mut Table, scene: &Scene, light_layers: bool) {
             ..LightRow::default()
         });
     }
+    let windows = scene.portals.iter().map(portal).collect();
+    arrange(table, rows, windows);
+}
+
+/// Counts the lights, gathers those with a place in clusters if they are many, and puts the rows in their order.
+fn arrange(table: &mut Table, mut rows: Vec<LightRow>, windows: Vec<LightRow>) {
+    let far = |r: &LightRow| r.kind == SUN || r.kind == SKY;
+    let others = rows.iter().position(far).unwrap_or(rows.len()) as u32;
+    table.globals.others = others;
+    table.globals.sky_light = rows
+        .iter()
+        .position(|r| r.kind == SKY)
+        .map_or(NONE, |row| row as u32);
     table.globals.lights = rows.len() as u32;
+    table.globals.portals = windows.len() as u32;
     table.globals.soft_lights = soft(table, &rows);
-    accumulate(table, &mut rows);
-    rows.extend(scene.portals.iter().map(portal));
-    table.globals.portals = scene.portals.len() as u32;
+    table.globals.tree = NONE;
+    for row in &mut rows {
+        row.parent = NONE;
+    }
+    let mut clusters = Vec::new();
+    if table.globals.lights > WEIGHED && others > 1 {
+        table.globals.tree = (rows.len() + windows.len()) as u32;
+        clusters = tree::build(table, &mut rows, others, table.globals.tree);
+    }
+    rows.extend(windows);
+    rows.extend(clusters);
     table.lights = rows;
 }
 
 /// Renews what depends on places after a mesh has moved.
 pub(super) fn moved(table: &mut Table) {
-    let lit = |row: &LightRow| row.kind != RECT && row.kind != TRIANGLE;
-    let fixed: Vec<LightRow> = table.lights.iter().copied().filter(lit).collect();
-    let (windows, others): (Vec<_>, Vec<_>) = fixed.into_iter().partition(|r| r.kind == PORTAL);
     let mut rows = emitters(table);
-    table.globals.others = rows.len() as u32;
-    rows.extend(others);
-    table.globals.lights = rows.len() as u32;
-    if let Some(sky) = rows.iter().position(|r| r.kind == SKY) {
-        table.globals.sky_light = sky as u32;
+    let before = |r: &&LightRow| r.kind == RECT || r.kind == TRIANGLE;
+    let mut same = table.lights.iter().filter(before).count() == rows.len();
+    for (row, old) in rows.iter_mut().zip(&table.lights) {
+        row.parent = old.parent;
+        same &= bytemuck::bytes_of(row) == bytemuck::bytes_of(old);
     }
-    table.globals.soft_lights = soft(table, &rows);
-    accumulate(table, &mut rows);
-    rows.extend(windows);
-    table.lights = rows;
+    // No light has moved: the clusters stand.
+    if same {
+        return;
+    }
+    let fixed = table.lights.iter().copied().filter(|r| !before(&r));
+    let (windows, others) = fixed
+        .filter(|r| r.kind != CLUSTER)
+        .partition(|r| r.kind == PORTAL);
+    let others: Vec<LightRow> = others;
+    rows.extend(others);
+    arrange(table, rows, windows);
 }
 
 /// Whether scattering must meet some light too: triangles, and those whose texture was found black (see [`glow`]).
@@ -187,11 +214,7 @@ fn emitters(table: &mut Table) -> Vec<LightRow> {
                 n: cross.normalize().into(),
                 area: if kind == RECT && !square { -area } else { area },
                 radiance: radiance.into(),
-                cumulative: if material.flags & DOUBLE_SIDED != 0 {
-                    2.0
-                } else {
-                    1.0
-                },
+                parent: NONE,
             });
         }
         k += if quad.is_some() { 2 } else { 1 };
@@ -232,31 +255,5 @@ fn portal(p: &Portal) -> LightRow {
         area: if square { n.length() } else { -n.length() },
         place: NONE,
         ..LightRow::default()
-    }
-}
-
-/// The distribution by power, for scenes with more lights than are weighed at each point.
-fn accumulate(table: &Table, rows: &mut [LightRow]) {
-    let (lo, hi) = table.bvh.bounds();
-    let size = (hi - lo).length_squared().max(1e-6);
-    let power: Vec<f64> = rows
-        .iter()
-        .map(|r| {
-            let lum = f64::from(luminance(Vec3::from(r.radiance)));
-            let pi = std::f64::consts::PI;
-            match r.kind {
-                RECT | TRIANGLE => pi * lum * f64::from(r.area.abs() * r.cumulative),
-                SUN => lum * f64::from(size) * 0.25,
-                SKY => pi * f64::from(table.globals.sky_scale[3]) * f64::from(size) * 0.25,
-                _ => 4.0 * pi * lum,
-            }
-        })
-        .collect();
-    let total: f64 = power.iter().sum::<f64>().max(1e-300);
-    let mut sum = 0.0;
-    let last = rows.len().saturating_sub(1);
-    for (i, row) in rows.iter_mut().enumerate() {
-        sum += power[i];
-        row.cumulative = if i == last { 1.0 } else { (sum / total) as f32 };
     }
 }

@@ -107,6 +107,15 @@ pub struct TextureRow {
     pub flags: u32,
 }
 
+/// Layer of light that the first sheet of a camera ray scatters back, with [`Globals::events`].
+pub const REFLECTED: u32 = 0;
+/// See [`REFLECTED`]: scatters on.
+pub const TRANSMITTED: u32 = 1;
+/// See [`REFLECTED`]: lets through its gaps.
+pub const PASSED: u32 = 2;
+/// See [`REFLECTED`]: gives off.
+pub const EMITTED: u32 = 3;
+
 /// [`LightRow::kind`]: a rectangle.
 pub const RECT: u32 = 0;
 /// [`LightRow::kind`]: a triangle.
@@ -122,7 +131,13 @@ pub const SKY: u32 = 5;
 /// [`LightRow::kind`]: a window; these rows come after the lights.
 pub const PORTAL: u32 = 6;
 
-/// A light (or a window).
+/// [`LightRow::kind`]: lights together; these rows come after the windows. The place is the middle of their box, the
+/// first edge half its sides, the second cos and sin of the half angle of the cone of their normals and the cosine of how far
+/// beyond it they shine, the normal its axis, the area the square of half the diagonal, the radiance's first number their
+/// power; layer and place are the rows of the two halves.
+pub const CLUSTER: u32 = 7;
+
+/// A light (or a window, or a cluster of lights).
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct LightRow {
@@ -144,8 +159,8 @@ pub struct LightRow {
     pub area: f32,
     /// Radiance; sun: irradiance; point and spot: intensity.
     pub radiance: [f32; 3],
-    /// Share of the choice when lights are chosen by power, summed up to and including this row.
-    pub cumulative: f32,
+    /// Row of the cluster that it is a half of, or [`NONE`].
+    pub parent: u32,
 }
 
 /// Numbers of the scene that are not rows.
@@ -176,8 +191,12 @@ pub struct Globals {
     pub offset: f32,
     /// 4, the taps of a bilinear texture: a loop bound that shader compilers do not know.
     pub taps: u32,
-    /// First light that is no surface: suns are looked for from there.
+    /// First light that has no place: sun and sky. These are weighed one by one.
     pub others: u32,
+    /// Row of the cluster of all lights before these, or [`NONE`]: few lights are weighed one by one.
+    pub tree: u32,
+    /// 1: the layers are [`crate::scene::EVENT_NAMES`], every light is of layer 0.
+    pub events: u32,
     /// Nothing.
-    pub spare: [u32; 3],
+    pub spare: u32,
 }

@@ -75,6 +75,17 @@ pub(crate) fn sheets_over_floor(count: usize, gap: f32, sun: Option<Light>) -> S
     scene
 }
 
+/// Matt lace with the same gap in every direction.
+pub(crate) fn even_lace() -> Material {
+    Material::diffuse_sheet("lace", [0.38; 3], [0.46; 3], 0.35)
+}
+
+/// A sheet of 4 m x 4 m around the origin, the weft along x, the warp along y.
+pub(crate) fn sheet(material: usize) -> Mesh {
+    let corner = Vec3::new(-2.0, -2.0, 0.0);
+    quad("sheet", corner, Vec3::X * 4.0, Vec3::Y * 4.0, material)
+}
+
 /// An even environment of radiance 1.
 pub(crate) fn furnace() -> Environment {
     Environment {
@@ -137,6 +148,26 @@ pub(crate) fn curtain_room(curtain: Material, columns: usize) -> Scene {
             0.67,
         ),
         ..Scene::default()
+    }
+}
+
+/// Cuts the panel of [`curtain_room`] into `count` squares of a grid, `fill` of a cell's side each, with as much light together
+/// as the whole grid of them would have.
+pub(crate) fn cut_panel(scene: &mut Scene, count: usize, fill: f32) {
+    let across = (count as f32).sqrt().ceil() as usize;
+    let side = 1.8 / across as f32;
+    let more = (across * across) as f32 / count as f32;
+    scene.meshes.retain(|m| m.name != "panel");
+    scene.materials[2].emission = scene.materials[2].emission.map(|e| e * more);
+    for k in 0..count {
+        let corner = Vec3::new(
+            -1.5 + (k % across) as f32 * side,
+            1.1 + (k / across) as f32 * side,
+            -1.0,
+        );
+        let edge = fill * side;
+        let panel = quad("panel", corner, Vec3::X * edge, Vec3::Y * edge, 2);
+        scene.meshes.insert(0, panel);
     }
 }
 

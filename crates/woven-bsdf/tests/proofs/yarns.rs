@@ -38,8 +38,12 @@ fn along_the_normal_crimp_does_not_matter() {
         for (a, b, section) in [(0.5, 0.7, 1.0), (0.8, 0.6, 0.4)] {
             let yarns = Yarns::new(&draft, gauge(a), gauge(b), section);
             let (got, known) = (yarns.openness(normal, 64), (1.0 - a) * (1.0 - b));
-            // A row of cells of 1/64 pitch along the open half of the other yarn's pitch.
-            assert!((got - known).abs() < 0.008, "{}: {got} {known}", draft.name);
+            // The points of the cells, and the chain of balls that a tube is made of, which lets a little more through.
+            assert!(
+                (got - known).abs() < 0.0015,
+                "{}: {got} {known}",
+                draft.name
+            );
         }
     }
 }
@@ -51,9 +55,9 @@ fn flat_yarns_are_the_aggregated_form() {
     for (theta, phi) in [(0.3, 0.2), (0.8, 1.0), (1.0, 2.5)] {
         let w = Vec3::from_angles(theta, phi);
         let (got, known) = (yarns.openness(w, 64), openness(0.5, 0.6, 0.02, w));
-        assert!((got - known).abs() < 0.008, "{theta}: {got} {known}");
+        assert!((got - known).abs() < 0.0025, "{theta}: {got} {known}");
         // Seen from behind, light takes the same way.
-        assert!((yarns.openness(-w, 64) - got).abs() < 0.004);
+        assert!((yarns.openness(-w, 64) - got).abs() < 0.0015);
     }
 }
 

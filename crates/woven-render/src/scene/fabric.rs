@@ -94,7 +94,7 @@ pub fn wear(
 ///
 /// # Errors
 /// A sentence when the name leaves the folder, or it is no picture of at most 64 megapixels.
-fn openness_map(folder: &Path, name: &str) -> Result<OpennessMap> {
+pub fn openness_map(folder: &Path, name: &str) -> Result<OpennessMap> {
     ensure!(
         Path::new(name).file_name().is_some_and(|f| f == name),
         "the openness map {name:?} must lie beside the fabric file: give a file name without folders"

@@ -11,7 +11,7 @@ use woven_bsdf::fabric::Fabric;
 use woven_cloth::{CurtainClip, CurtainSpec};
 
 use crate::anchor::Anchor;
-use crate::catalog::{Catalog, FabricSpec, Measurement};
+use crate::catalog::{Catalog, FabricSpec, Source};
 use crate::optics::Summary;
 use crate::picture::{Choice, Photographer, Set, Shoot};
 use crate::progress::Progress;
@@ -53,13 +53,13 @@ pub enum Outcome {
 pub struct Subject {
     /// What the catalog says of it.
     pub spec: FabricSpec,
-    /// Its measurement.
-    pub measurement: Measurement,
+    /// Its measurement or fabric file.
+    pub source: Source,
     /// Its fabric file's contents.
     pub fabric: Fabric,
     /// What the fit found.
     pub summary: Summary,
-    /// SHA-256 of the fabric file.
+    /// SHA-256 of the fabric file, with its map of openness.
     pub fabric_hash: String,
     /// SHA-256 of the clip of its curtain.
     pub clip_hash: String,
@@ -122,7 +122,7 @@ struct Run<'a> {
     catalog: &'a Catalog,
     order: &'a Order,
     store: Store,
-    measurements: Vec<Measurement>,
+    sources: Vec<Source>,
     photographer: Photographer,
     progress: Progress,
 }
@@ -135,9 +135,9 @@ impl<'a> Run<'a> {
         order: &'a Order,
         stop: Arc<AtomicBool>,
     ) -> Result<Self> {
-        let mut measurements = Vec::new();
+        let mut sources = Vec::new();
         for spec in &catalog.fabrics {
-            measurements.push(spec.measurement(folder)?);
+            sources.push(spec.source(folder)?);
             cloth::spec(spec, 0.0, &catalog.motion)?;
         }
         let store = Store::open(&order.out)?;
@@ -157,7 +157,7 @@ impl<'a> Run<'a> {
             catalog,
             order,
             store,
-            measurements,
+            sources,
             photographer,
             progress: Progress::new(total, stop),
         })
@@ -243,14 +243,20 @@ impl<'a> Run<'a> {
     /// Measurement, fit and motion of one fabric, each taken from the folder if it is there.
     fn subject(&mut self, index: usize) -> Result<Subject> {
         let spec = self.catalog.fabrics[index].clone();
-        let measurement = self.measurements[index].clone();
+        let source = self.sources[index].clone();
         let id = &spec.id;
-        let path = self.put_measurement(&spec, &measurement)?;
+        let path = self.put_source(&spec, &source)?;
         self.check_stop()?;
 
         let how = serde_json::to_string(&self.catalog.fit)?;
         let tint = format!("{:?}", spec.tint);
-        let hash = sha256(&measurement.bytes);
+        let bytes = [Some(&source.bytes), source.map.as_ref().map(|(_, map)| map)];
+        let hash = bytes
+            .into_iter()
+            .flatten()
+            .map(|b| sha256(b))
+            .collect::<Vec<_>>()
+            .join(" ");
         let key = Key::new(
             "fit",
             &[
@@ -274,16 +280,22 @@ impl<'a> Run<'a> {
                 )
             }
             _ => {
-                self.progress.say(&format!("{}: fitting", spec.name));
-                let progress = &self.progress;
-                let fitted = optics::fit(&path, &spec, &self.catalog.fit, &|share| {
-                    progress.show(share * FIT_WORK);
-                    !progress.stopped()
-                });
-                let fitted = self.or_stopped(fitted)?;
+                let fitted = if spec.fabric_file.is_empty() {
+                    self.progress.say(&format!("{}: fitting", spec.name));
+                    let progress = &self.progress;
+                    let fitted = optics::fit(&path, &spec, &self.catalog.fit, &|share| {
+                        progress.show(share * FIT_WORK);
+                        !progress.stopped()
+                    });
+                    self.or_stopped(fitted)?
+                } else {
+                    optics::ready(&path, &spec)?
+                };
                 let text = fitted.fabric.to_toml();
-                self.store
-                    .put(&format!("{id}/fit.html"), &key, fitted.report.as_bytes())?;
+                if let Some(report) = &fitted.report {
+                    self.store
+                        .put(&format!("{id}/fit.html"), &key, report.as_bytes())?;
+                }
                 self.store.put(&fabric_name, &key, text.as_bytes())?;
                 self.store.put(
                     &summary_name,
@@ -299,32 +311,38 @@ impl<'a> Run<'a> {
         let (clip, clip_hash) = self.clip(&spec, &curtain)?;
         Ok(Subject {
             spec,
-            measurement,
+            fabric_hash: match &source.map {
+                None => sha256(fabric_text.as_bytes()),
+                Some((_, map)) => sha256(&[fabric_text.as_bytes(), map].concat()),
+            },
+            source,
             fabric,
             summary,
-            fabric_hash: sha256(fabric_text.as_bytes()),
             clip_hash,
             clip,
         })
     }
 
-    /// A carried measurement is put beside the page, with its notices; another one is read where it is.
-    fn put_measurement(&self, spec: &FabricSpec, measurement: &Measurement) -> Result<PathBuf> {
-        let path = if measurement.builtin {
-            self.store
-                .path(&format!("{}/{}", spec.id, measurement.file))
-        } else {
-            measurement.path.clone()
-        };
-        if measurement.builtin {
-            let mut files: Vec<(&str, &[u8])> = assets::notices();
-            files.push((&measurement.file, &measurement.bytes));
-            for (file, bytes) in files {
-                let name = format!("{}/{file}", spec.id);
-                let key = Key::new("measurement", &[("sha256", &sha256(bytes))]);
-                if self.store.get(&name, &key).is_none() {
-                    self.store.put(&name, &key, bytes)?;
-                }
+    /// A carried measurement is put beside the page, with its notices, and so is a map of openness; another file is read where it is.
+    fn put_source(&self, spec: &FabricSpec, source: &Source) -> Result<PathBuf> {
+        let mut files: Vec<(&str, &[u8])> = Vec::new();
+        let mut path = source.path.clone();
+        if source.builtin {
+            files = assets::notices();
+            files.push((&source.file, &source.bytes));
+            path = self.store.path(&format!("{}/{}", spec.id, source.file));
+        }
+        files.extend(
+            source
+                .map
+                .iter()
+                .map(|(name, map)| (name.as_str(), map.as_slice())),
+        );
+        for (file, bytes) in files {
+            let name = format!("{}/{file}", spec.id);
+            let key = Key::new("source", &[("sha256", &sha256(bytes))]);
+            if self.store.get(&name, &key).is_none() {
+                self.store.put(&name, &key, bytes)?;
             }
         }
         Ok(path)
@@ -435,7 +453,7 @@ impl<'a> Run<'a> {
     fn set_up(&self, subject: &Subject, light: Preset) -> Result<Set> {
         let picture = &self.catalog.picture;
         let mut stage = Stage::new(light).with_curtain(cloth::mesh(&subject.clip, None));
-        stage.set_material(optics::material(&subject.fabric)?);
+        stage.dress(&subject.fabric, &self.store.path(&subject.spec.id))?;
         let shoot = Shoot {
             size: picture.size,
             depth: picture.depth,

@@ -15,7 +15,12 @@ mod room;
 mod shape;
 mod texture;
 
+use std::path::Path;
+
+use anyhow::Result;
 use glam::{Vec2, Vec3};
+use woven_bsdf::fabric::Fabric;
+use woven_render::scene::fabric::wear;
 use woven_render::scene::{
     Camera, LAYER_LAMPS, LAYER_SKY, Material, Mesh, Scene, Texture, TextureUse,
 };
@@ -109,6 +114,17 @@ impl Stage {
             name: "curtain".to_owned(),
             ..material
         };
+    }
+
+    /// Weaves the curtain of a fabric, whose map of openness lies in `folder`.
+    ///
+    /// # Errors
+    /// A sentence when the fabric cannot be rendered.
+    pub fn dress(&mut self, fabric: &Fabric, folder: &Path) -> Result<()> {
+        let mut material = Material::matt("curtain", [0.0; 3]);
+        wear(&mut material, fabric, folder, &mut self.scene.textures)?;
+        self.set_material(material);
+        Ok(())
     }
 
     /// The scene to render.

@@ -3,6 +3,10 @@
 //! `cargo run --release -p woven-cloth --example statistics -- 8` hangs a sheet of 1.0 m x 2.4 m in gusts of eight seeds with either
 //! solver, 4 s each, and prints mean and rms reach of the hem and rms speed over the last 2 s, and the largest strain.
 
+#[path = "../tests/known_answers/cloth.rs"]
+mod cloth;
+
+use cloth::cloth;
 use woven_cloth::*;
 
 /// Sums over samples: count, reach, reach², speed²; the largest strain.
@@ -16,19 +20,7 @@ struct Sums {
 }
 
 fn sheet() -> Sheet {
-    let mechanics = Mechanics {
-        areal_density: 0.12,
-        tensile_warp: 2000.0,
-        tensile_weft: 2000.0,
-        shear: 20.0,
-        bending_warp: 5e-6,
-        bending_weft: 5e-6,
-        stretch_damping: 0.0,
-        bending_damping: 0.0,
-        openness: 0.0,
-        ..Mechanics::default()
-    };
-    let mut sheet = Sheet::flat(25, 49, 1.0, 2.4, mechanics);
+    let mut sheet = Sheet::flat(25, 49, 1.0, 2.4, cloth());
     for k in 0..sheet.len() {
         // Two soft folds, so that the motion is not that of a plane.
         let [x, y, _] = sheet.position(k);

@@ -1,6 +1,7 @@
 //! What the cloth cannot enter: floor, wall, sill, and itself.
 
 mod cells;
+mod creases;
 mod distance;
 mod folds;
 mod guard;

@@ -112,6 +112,11 @@ pub struct Material {
     pub alpha_cutoff: Option<f32>,
     /// Multiplies `emission`.
     pub emission_texture: Option<TextureUse>,
+    /// Roughness and metalness from place to place (glTF's convention): the square of its green multiplies the widths of the
+    /// reflection lobe, its blue the metalness of `metal`. `linear` and `shape` are those of no metal.
+    pub gloss_texture: Option<TextureUse>,
+    /// With `gloss_texture`: the colour that metal reflects, which `color_texture` multiplies, and the metalness.
+    pub metal: [f32; 4],
     /// Bends the shading normal: its colours are 2 c - 1 in the frame of u, minus v and the normal (glTF's convention).
     pub normal_texture: Option<TextureUse>,
     /// Multiplies the bending's first two numbers.
@@ -352,6 +357,8 @@ impl Material {
             multiplies: false,
             alpha_cutoff: None,
             emission_texture: None,
+            gloss_texture: None,
+            metal: [0.0; 4],
             normal_texture: None,
             normal_scale: 1.0,
             double_sided: false,

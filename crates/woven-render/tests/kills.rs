@@ -83,6 +83,8 @@ fn animate(dir: &Path, out: &Path, frames: u32, spp: u32) -> Command {
             "--aov",
             "--depth",
             "4",
+            "--shutter",
+            "0.5",
         ])
         .args([
             "--spp",

@@ -59,6 +59,7 @@ fn rows_lie_where_the_shader_reads_them() {
         shape,
         weights,
         emission,
+        metal,
         flags,
         layer,
         color_texture,
@@ -70,7 +71,7 @@ fn rows_lie_where_the_shader_reads_them() {
         normal_texture,
         normal_scale,
         measured,
-        unused
+        gloss_texture
     );
     same!(
         m, LightRow, p, kind, u, layer, v, place, n, area, radiance, parent

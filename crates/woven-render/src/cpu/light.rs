@@ -122,8 +122,13 @@ pub(super) fn weight(table: &Table, at: &Place, i: u32) -> f32 {
                 return 0.0;
             }
             // All of it behind a surface that lets nothing through.
-            let rise = |edge: [f32; 3]| at.n.dot(Vec3::from(edge)).max(0.0);
-            if !at.transmits && at.n.dot(Vec3::from(r.p) - at.p) + rise(r.u) + rise(r.v) <= 0.0 {
+            let (u, v) = (at.n.dot(Vec3::from(r.u)), at.n.dot(Vec3::from(r.v)));
+            let rise = if r.kind == RECT {
+                u.max(0.0) + v.max(0.0)
+            } else {
+                u.max(v).max(0.0)
+            };
+            if !at.transmits && at.n.dot(Vec3::from(r.p) - at.p) + rise <= 0.0 {
                 return 0.0;
             }
             let d2 = to.length_squared().max(1e-12);

@@ -174,7 +174,7 @@ impl Incident {
         let wi = s.local(self.wi);
         let mut value = surface::evaluate(table, m, s, wi, wo) * self.light;
         if self.pdf > 0.0 {
-            value *= heuristic(self.pdf, surface::density(table, m, wo, wi));
+            value *= heuristic(self.pdf, surface::density(table, m, s, wo, wi));
         }
         value
     }
@@ -382,8 +382,8 @@ fn follow(
             return second;
         }
         let u = rng.set(2 * bounce);
-        let wi = surface::sample(table, m, v.wo, Vec3::new(u[0], u[1], u[2]));
-        let pdf = surface::density(table, m, v.wo, wi);
+        let wi = surface::sample(table, m, &v.s, v.wo, Vec3::new(u[0], u[1], u[2]));
+        let pdf = surface::density(table, m, &v.s, v.wo, wi);
         if pdf <= 1e-12 {
             return second;
         }

@@ -155,7 +155,7 @@ fn look(table: &Table, first: &First, y: &Second, side: bool, own: bool) -> Sigh
     let m = &table.materials[x.s.material as usize];
     let wi = x.s.local(d);
     let yarn = 1.0 - surface::gap(table, &table.materials[y.s.material as usize], &y.s, d);
-    let density = first.share * surface::density(table, m, x.wo, wi) * yarn;
+    let density = first.share * surface::density(table, m, &x.s, x.wo, wi) * yarn;
     if density <= 0.0 {
         return Sight::default();
     }

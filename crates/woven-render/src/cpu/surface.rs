@@ -7,7 +7,7 @@ use super::bvh::Hit;
 use super::math::sincos_turn;
 use super::measured;
 use crate::optics;
-use woven_bsdf::sheet::shape::{GAMMA_WARP, INV_MEAN_COVER};
+use woven_bsdf::sheet::shape::{F0, GAMMA_WARP, INV_MEAN_COVER, RALPHA_X, RALPHA_Y};
 
 use crate::table::{
     DOUBLE_SIDED, EMITS, EVEN, MATT, MEASURED, MULTIPLIES, MaterialRow, NONE, PLAIN_GLOSS, Table,
@@ -33,6 +33,8 @@ pub(crate) struct Surface {
     pub tint: Vec3,
     /// Coverage texture.
     pub alpha: f32,
+    /// Texture of the gloss: multiplies the widths of the reflection lobe; metalness.
+    pub gloss: [f32; 2],
 }
 
 impl Surface {
@@ -132,12 +134,14 @@ pub(crate) fn surface(table: &Table, hit: &Hit, wide: f32) -> Surface {
     let material = &table.materials[s.material as usize];
     let mut tint = Vec3::ONE;
     let mut alpha = 1.0;
+    let mut gloss = [1.0, 0.0];
     let mut uv = [0.0; 2];
     let mut turned = frame(table, place, hit.u, hit.v, ng);
     if material.color_texture != NONE
         || material.coverage_texture != NONE
         || material.emission_texture != NONE
         || material.normal_texture != NONE
+        || material.gloss_texture != NONE
     {
         uv = uv_at(table, place, hit.u, hit.v);
         let area = wide * wide * s.v[3];
@@ -148,6 +152,10 @@ pub(crate) fn surface(table: &Table, hit: &Hit, wide: f32) -> Surface {
         if material.normal_texture != NONE {
             let c = texel(table, material.normal_texture, uv, area);
             turned = bent(turned, s.weft[3], material.normal_scale, c);
+        }
+        if material.gloss_texture != NONE {
+            let c = texel(table, material.gloss_texture, uv, area);
+            gloss = [c[1] * c[1], c[2] * material.metal[3]];
         }
         alpha = coverage(table, material, uv, area);
     }
@@ -167,6 +175,7 @@ pub(crate) fn surface(table: &Table, hit: &Hit, wide: f32) -> Surface {
         light: s.light,
         tint,
         alpha,
+        gloss,
     }
 }
 
@@ -375,6 +384,17 @@ pub(crate) fn evaluate(table: &Table, m: &MaterialRow, s: &Surface, wi: Vec3, wo
     if m.flags & MEASURED != 0 {
         return scale * measured::evaluate(table, m.measured, wi, wo);
     }
+    if m.gloss_texture != NONE {
+        let b = optics::sheet_basis(&glossed(m, s), wi, wo);
+        let even = k(0) * b[0] + k(1) * b[1] + k(2 + back) * b[2] + k(4 + back) * b[4];
+        let metal = s.gloss[1];
+        let base = Vec3::new(m.metal[0], m.metal[1], m.metal[2]) * s.tint;
+        // By Schlick's reflectance at normal incidence, white or tinted gloss and metal mix evenly.
+        let f0 = m.shape[F0];
+        let gloss = (k(3 + back) * (f0 * (1.0 - metal)) + base * metal)
+            * (1.0 / (f0 + (1.0 - f0) * metal).max(1e-6));
+        return (even * s.tint * (1.0 - metal) + gloss * b[3]) * s.alpha;
+    }
     let plain = m.flags & PLAIN_GLOSS != 0;
     let value = |shape: &[f32; crate::scene::MAX_SHAPE], share: f32| {
         let b = optics::sheet_basis(shape, wi, wo);
@@ -390,6 +410,26 @@ pub(crate) fn evaluate(table: &Table, m: &MaterialRow, s: &Surface, wi: Vec3, wo
     woven + value(&closed(m.shape), 1.0 - s.alpha)
 }
 
+/// Narrowest reflection lobe of a texture; narrower ones are not told apart from it.
+const LEAST_WIDTH: f32 = 0.02;
+
+/// The shape with the gloss of the texture.
+fn glossed(m: &MaterialRow, s: &Surface) -> [f32; crate::scene::MAX_SHAPE] {
+    let mut shape = m.shape;
+    let [width, metal] = s.gloss;
+    shape[RALPHA_X] = (shape[RALPHA_X] * width).max(LEAST_WIDTH);
+    shape[RALPHA_Y] = (shape[RALPHA_Y] * width).max(LEAST_WIDTH);
+    shape[F0] += (1.0 - shape[F0]) * metal;
+    shape
+}
+
+/// Sampling weights with the gloss of the texture: metal has nothing else.
+fn glossed_weights(m: &MaterialRow, s: &Surface) -> [f32; crate::scene::MAX_LINEAR] {
+    let mut weights = m.weights.map(|w| w * (1.0 - s.gloss[1]));
+    weights[3] += s.gloss[1];
+    weights
+}
+
 /// The same sheet without a gap.
 fn closed(mut shape: [f32; crate::scene::MAX_SHAPE]) -> [f32; crate::scene::MAX_SHAPE] {
     shape[GAMMA_WARP] = 1.0;
@@ -399,19 +439,22 @@ fn closed(mut shape: [f32; crate::scene::MAX_SHAPE]) -> [f32; crate::scene::MAX_
 
 /// Density of [`sample`].
 #[inline(always)]
-pub(crate) fn density(table: &Table, m: &MaterialRow, wo: Vec3, wi: Vec3) -> f32 {
+pub(crate) fn density(table: &Table, m: &MaterialRow, s: &Surface, wo: Vec3, wi: Vec3) -> f32 {
     if m.flags & MATT != 0 {
         return m.weights[if wi.z * wo.z < 0.0 { 0 } else { 2 }] * wi.z.abs() * FRAC_1_PI;
     }
     if m.flags & MEASURED != 0 {
         return measured::density(table, m.measured, wo, wi);
     }
+    if m.gloss_texture != NONE {
+        return optics::sheet_pdf(&glossed(m, s), &glossed_weights(m, s), wo, wi);
+    }
     optics::sheet_pdf(&m.shape, &m.weights, wo, wi)
 }
 
 /// A direction to go on in, in the sheet's frame.
 #[inline(always)]
-pub(crate) fn sample(table: &Table, m: &MaterialRow, wo: Vec3, u: Vec3) -> Vec3 {
+pub(crate) fn sample(table: &Table, m: &MaterialRow, s: &Surface, wo: Vec3, u: Vec3) -> Vec3 {
     if m.flags & MATT != 0 {
         let r = u.x.sqrt();
         let (sin, cos) = sincos_turn(u.y);
@@ -425,6 +468,9 @@ pub(crate) fn sample(table: &Table, m: &MaterialRow, wo: Vec3, u: Vec3) -> Vec3 
     }
     if m.flags & MEASURED != 0 {
         return measured::sample(table, m.measured, wo, u);
+    }
+    if m.gloss_texture != NONE {
+        return optics::sheet_sample(&glossed(m, s), &glossed_weights(m, s), wo, u);
     }
     optics::sheet_sample(&m.shape, &m.weights, wo, u)
 }

@@ -91,7 +91,9 @@ fn light_weight(at: Place, i: u32) -> f32 {
             return 0.0;
         }
         // All of it behind a surface that lets nothing through.
-        let rise = max(dot(at.n, lights[i].u), 0.0) + max(dot(at.n, lights[i].v), 0.0);
+        let u = max(dot(at.n, lights[i].u), 0.0);
+        let v = max(dot(at.n, lights[i].v), 0.0);
+        let rise = select(max(u, v), u + v, kind == RECT);
         if (!at.transmits && dot(at.n, lights[i].p - at.p) + rise <= 0.0) {
             return 0.0;
         }

@@ -15,7 +15,9 @@ struct Point {
     ng: vec3<f32>,
     alpha: f32,
     fx: vec3<f32>,
+    width: f32,
     fz: vec3<f32>,
+    metal: f32,
     tint: vec3<f32>,
 }
 
@@ -144,7 +146,7 @@ fn total_of(base: u32) -> f32 {
 }
 
 fn point_of(s: Surface) -> Point {
-    return Point(s.p, s.material, s.ng, s.alpha, s.fx, s.fz, s.tint);
+    return Point(s.p, s.material, s.ng, s.alpha, s.fx, s.gloss.x, s.fz, s.gloss.y, s.tint);
 }
 
 fn surface_of(point: Point) -> Surface {
@@ -157,6 +159,7 @@ fn surface_of(point: Point) -> Surface {
     s.material = point.material;
     s.tint = point.tint;
     s.alpha = point.alpha;
+    s.gloss = vec2<f32>(point.width, point.metal);
     return s;
 }
 

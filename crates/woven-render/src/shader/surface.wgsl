@@ -15,6 +15,8 @@ struct Surface {
     light: u32,
     tint: vec3<f32>,
     alpha: f32,
+    // Texture of the gloss: multiplies the widths of the reflection lobe; metalness.
+    gloss: vec2<f32>,
 }
 
 fn local(s: Surface, w: vec3<f32>) -> vec3<f32> {
@@ -105,10 +107,12 @@ fn surface(hit: Hit, wide: f32) -> Surface {
     let material = shades[place].material;
     var tint = vec3<f32>(1.0);
     var alpha = 1.0;
+    var gloss = vec2<f32>(1.0, 0.0);
     var uv = vec2<f32>(0.0);
     var f = shading_frame(place, hit.u, hit.v, ng);
     if (materials[material].color_texture != NONE || materials[material].coverage_texture != NONE
-        || materials[material].emission_texture != NONE || materials[material].normal_texture != NONE) {
+        || materials[material].emission_texture != NONE || materials[material].normal_texture != NONE
+        || materials[material].gloss_texture != NONE) {
         uv = uv_at(place, hit.u, hit.v);
         let area = wide * wide * shades[place].v.w;
         if (materials[material].color_texture != NONE) {
@@ -117,6 +121,10 @@ fn surface(hit: Hit, wide: f32) -> Surface {
         if (materials[material].normal_texture != NONE) {
             let c = texel(materials[material].normal_texture, uv, area);
             f = bent(f, shades[place].weft.w, materials[material].normal_scale, c);
+        }
+        if (materials[material].gloss_texture != NONE) {
+            let c = texel(materials[material].gloss_texture, uv, area);
+            gloss = vec2<f32>(c.y * c.y, c.z * materials[material].metal.w);
         }
         alpha = coverage(material, uv, area);
     }
@@ -129,7 +137,7 @@ fn surface(hit: Hit, wide: f32) -> Surface {
         tint *= sum;
     }
     let p = corner(place) + e1 * hit.u + e2 * hit.v;
-    return Surface(p, ng, f[0], f[1], f[2], uv, material, shades[place].light, tint, alpha);
+    return Surface(p, ng, f[0], f[1], f[2], uv, material, shades[place].light, tint, alpha, gloss);
 }
 
 fn open_along(m: u32, w: vec3<f32>) -> f32 {
@@ -278,6 +286,9 @@ fn emission_at(place: u32, u: f32, v: f32) -> vec3<f32> {
     return e * texel(materials[m].emission_texture, uv_at(place, u, v), 0.0).xyz;
 }
 
+// Narrowest reflection lobe of a texture.
+const LEAST_WIDTH: f32 = 0.02;
+
 // A direction, f for it, its density.
 struct Scattered {
     wi: vec3<f32>,
@@ -320,7 +331,25 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
     let d = materials[m].shape[3];
     let w1 = materials[m].weights[1];
     var shape = array<f32, 16>(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w);
-    let weights = array<f32, 8>(w0.x, w0.y, w0.z, w0.w, w1.x, w1.y, w1.z, w1.w);
+    var weights = array<f32, 8>(w0.x, w0.y, w0.z, w0.w, w1.x, w1.y, w1.z, w1.w);
+    // Of gloss and of the rest; a texture mixes metal in, by Schlick's reflectance at normal incidence.
+    let plain = (flags & PLAIN_GLOSS) != 0u;
+    var rest = s.tint;
+    var gloss = materials[m].linear[3u + back].xyz * select(s.tint, vec3<f32>(1.0), plain);
+    if (materials[m].gloss_texture != NONE) {
+        let metal = s.gloss.y;
+        let f0 = shape[7];
+        shape[5] = max(shape[5] * s.gloss.x, LEAST_WIDTH);
+        shape[6] = max(shape[6] * s.gloss.x, LEAST_WIDTH);
+        shape[7] = f0 + (1.0 - f0) * metal;
+        for (var k = 0u; k < 8u; k++) {
+            weights[k] *= 1.0 - metal;
+        }
+        weights[3] += metal;
+        rest *= 1.0 - metal;
+        gloss = (materials[m].linear[3u + back].xyz * (f0 * (1.0 - metal)) + materials[m].metal.xyz * s.tint * metal)
+            * (1.0 / max(shape[7], 1e-6));
+    }
     if ((flags & MATT) == 0u) {
         if (draw) {
             wi = sheet_sample(shape, weights, wo, u);
@@ -329,14 +358,13 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
     }
     var f = vec3<f32>(0.0);
     var part = s.alpha;
-    let plain = (flags & PLAIN_GLOSS) != 0u;
     // The woven share, then the closed one where a map tells them apart: one copy of the code.
     let parts = select(1u, 2u, (flags & MULTIPLIES) != 0u);
     for (var k = 0u; k < parts; k++) {
         let basis = sheet_basis(shape, wi, wo);
         f += (materials[m].linear[0].xyz * basis[0] + materials[m].linear[1].xyz * basis[1]
-            + materials[m].linear[2u + back].xyz * basis[2] + materials[m].linear[4u + back].xyz * basis[4]) * (s.tint * part)
-            + materials[m].linear[3u + back].xyz * basis[3] * select(s.tint * part, vec3<f32>(part), plain);
+            + materials[m].linear[2u + back].xyz * basis[2] + materials[m].linear[4u + back].xyz * basis[4]) * (rest * part)
+            + gloss * basis[3] * part;
         shape[0] = 1.0;
         shape[8] = 1.0;
         part = 1.0 - s.alpha;

@@ -69,6 +69,7 @@ struct MaterialRow {
     shape: array<vec4<f32>, 4>,
     weights: array<vec4<f32>, 2>,
     emission: vec4<f32>,
+    metal: vec4<f32>,
     flags: u32,
     layer: u32,
     color_texture: u32,
@@ -80,7 +81,7 @@ struct MaterialRow {
     normal_texture: u32,
     normal_scale: f32,
     measured: u32,
-    unused: u32,
+    gloss_texture: u32,
 }
 
 struct LightRow {

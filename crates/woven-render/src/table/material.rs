@@ -40,7 +40,8 @@ pub(super) fn row(
     }
     let mut flags = 0;
     let mut set = |on: bool, flag: u32| flags |= if on { flag } else { 0 };
-    set(black(1) && black(3) && black(4) && !measured, MATT);
+    let lobes = !black(1) || !black(3) || !black(4) || m.gloss_texture.is_some();
+    set(!lobes && !measured, MATT);
     set(measured, MEASURED);
     set(multiplies, MULTIPLIES);
     set(m.double_sided, DOUBLE_SIDED);
@@ -52,6 +53,7 @@ pub(super) fn row(
         linear,
         shape: m.shape,
         weights: optics::weights(&most, &m.shape),
+        metal: m.metal,
         emission: [m.emission[0], m.emission[1], m.emission[2], albedo],
         flags,
         layer: if light_layers {
@@ -72,7 +74,7 @@ pub(super) fn row(
         measured: m.measured.as_ref().map_or(NONE, |t| textures.measured(t)),
         normal_texture: textures.row(m.normal_texture, scene),
         normal_scale: m.normal_scale,
-        unused: 0,
+        gloss_texture: textures.row(m.gloss_texture, scene),
     }
 }
 

@@ -46,6 +46,8 @@ pub struct MaterialRow {
     pub weights: [f32; MAX_LINEAR],
     /// Radiance, then the luminance of the sum of the linear factors.
     pub emission: [f32; 4],
+    /// Colour of metal and the metalness, where `gloss_texture` tells from place to place.
+    pub metal: [f32; 4],
     /// See the constants of this file.
     pub flags: u32,
     /// Light layer of the emission.
@@ -68,8 +70,8 @@ pub struct MaterialRow {
     pub normal_scale: f32,
     /// First word of the measured table among [`super::Table::texels`], where [`MEASURED`].
     pub measured: u32,
-    /// Nothing.
-    pub unused: u32,
+    /// Row of the texture of roughness and metalness or [`NONE`].
+    pub gloss_texture: u32,
 }
 
 /// [`MaterialRow::flags`]: no lobes, diffuse terms only.

@@ -1,4 +1,6 @@
 //! Light kept apart by what happened at the first sheet in view: scattered back, scattered through, let pass, given off.
+//!
+//! Seen to fail: with reflected and transmitted exchanged in the shader, and on the CPU with every crossing taken for the first.
 
 use crate::common::{backends, curtain_room, even_lace, furnace, picture, sheet};
 use glam::Vec3;

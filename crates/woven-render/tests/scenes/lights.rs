@@ -1,7 +1,6 @@
 //! Many lights: the tree of clusters finds those that matter, without bias and nearly as well as weighing each.
 //!
-//! Seen to fail: with both halves of a cluster taken at even odds the noise of 400 panels is NOISE_RED times that of 9;
-//! with the share of the last step left out the mean is MEAN_RED.
+//! Seen to fail: with both halves of a cluster taken at even odds the noise of 400 panels is 7.2 times that of 9.
 
 use crate::common::{backends, curtain_room, cut_panel, even_lace, mean, picture};
 use woven_render::film::Film;

@@ -5,4 +5,5 @@ mod blur;
 #[path = "../common/mod.rs"]
 mod common;
 mod events;
+mod gloss;
 mod lights;

@@ -9,7 +9,7 @@
 //! * k_t = c (1-m) t; a smooth clear pane (r < 0.1) passes the part of c that is common to the channels as a gap instead,
 //!   since a lobe that narrow is a delta: light then comes straight through a window.
 //!
-//! Metalness and roughness come from the texture's mean where there is one: a sheet has one shape.
+//! A texture of metalness and roughness goes to the reflection lobe from place to place; a lobe of transmission takes its mean.
 //!
 //! * sheen (KHR_materials_sheen) has no lobe of its own in the sheet. Its colour joins the diffuse reflection with the share that
 //!   the sheen's lobe reflects on the mean, and dims what lies below by as much: the colour and the energy are right, the bright rim is not.
@@ -52,10 +52,13 @@ pub(super) fn convert(
         pbr.metallic_factor().clamp(0.0, 1.0),
         pbr.roughness_factor().clamp(0.0, 1.0),
     );
-    if let Some(info) = pbr.metallic_roughness_texture() {
-        let mean = pictures.mean(&info.texture())?;
-        roughness *= mean[1];
-        metallic *= mean[2];
+    let full = (roughness * roughness).clamp(LEAST_ALPHA, 1.0);
+    let metal = [r, g, b, metallic];
+    let textured = pbr.metallic_roughness_texture();
+    if let Some(info) = &textured {
+        roughness *= pictures.mean(&info.texture())?[1];
+        // Where there is metal the texture says.
+        metallic = 0.0;
     }
     let specular = m.specular();
     let weight = specular
@@ -135,6 +138,12 @@ pub(super) fn convert(
     // Metal reflects its own colour, everything else white.
     material.plain_gloss = metallic < 0.5;
     let mut sets = Vec::new();
+    if let Some(info) = &textured {
+        material.gloss_texture = Some(pictures.used(info, false, &mut sets)?);
+        material.metal = metal;
+        material.shape[shape::RALPHA_X] = full;
+        material.shape[shape::RALPHA_Y] = full;
+    }
     material.color_texture = pbr
         .base_color_texture()
         .map(|i| pictures.used(&i, true, &mut sets))
@@ -175,6 +184,7 @@ pub(super) fn convert(
         material.emission = base;
         material.emission_texture = material.color_texture.take();
         material.normal_texture = None;
+        material.gloss_texture = None;
     }
     // A mesh has one set of coordinates here: the one that its colour asks for.
     let set = sets.first().copied().unwrap_or(0);

@@ -1,7 +1,7 @@
 //! What a cluster of lights is expected to give at a place. The pair of `shader/tree.wgsl`; `table/tree.rs` builds the
 //! clusters.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3Swizzles};
 
 use super::light::Place;
 use crate::table::{LightRow, Table};
@@ -64,16 +64,24 @@ fn shown(table: &Table, at: &Place, middle: Vec3, half: Vec3) -> f32 {
         outside = true;
         let (u, v) = (Vec3::from(w.u), Vec3::from(w.v));
         let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
-        let height = n.dot(at.p - corner);
+        let det = 1.0 / (uu * vv - uv * uv);
+        // Height above the window's plane and place along its sides, of the place and of ways from it.
+        let (a, b) = ((u * vv - v * uv) * det, (v * uu - u * uv) * det);
+        let eye = Vec3::new(
+            n.dot(at.p - corner),
+            a.dot(at.p - corner),
+            b.dot(at.p - corner),
+        );
+        let to = middle - at.p;
+        let to = Vec3::new(n.dot(to), a.dot(to), b.dot(to));
+        let [x, y, z] = [0, 1, 2].map(|k| Vec3::new(n[k], a[k], b[k]) * half[k]);
         let mut low = Vec2::INFINITY;
         let mut high = Vec2::NEG_INFINITY;
         for k in 0..8 {
-            let side = |bit: u32, x: f32| if k & bit == 0 { -x } else { x };
-            let to = middle + Vec3::new(side(1, half.x), side(2, half.y), side(4, half.z)) - at.p;
-            // Where the ray to the corner crosses the window's plane, from its corner.
-            let q = at.p + to * (height / (-n.dot(to)).max(height)) - corner;
-            let (a, b) = (q.dot(u), q.dot(v));
-            let place = Vec2::new(a * vv - b * uv, b * uu - a * uv) / (uu * vv - uv * uv);
+            let side = |bit: u32, x: Vec3| if k & bit == 0 { -x } else { x };
+            let way = to + side(1, x) + side(2, y) + side(4, z);
+            // Where the ray to the corner crosses the window's plane.
+            let place = eye.yz() + way.yz() * (eye.x / (-way.x).max(eye.x));
             low = low.min(place);
             high = high.max(place);
         }

@@ -57,17 +57,23 @@ fn box_shown(at: Place, middle: vec3<f32>, half: vec3<f32>) -> f32 {
         let uu = dot(u, u);
         let uv = dot(u, v);
         let vv = dot(v, v);
-        let height = dot(n, at.p - lights[w].p);
+        let det = 1.0 / (uu * vv - uv * uv);
+        // Height above the window's plane and place along its sides, of the place and of ways from it.
+        let a = (u * vv - v * uv) * det;
+        let b = (v * uu - u * uv) * det;
+        let start = at.p - lights[w].p;
+        let eye = vec3<f32>(dot(n, start), dot(a, start), dot(b, start));
+        let along_to = middle - at.p;
+        let to = vec3<f32>(dot(n, along_to), dot(a, along_to), dot(b, along_to));
+        let x = vec3<f32>(n.x, a.x, b.x) * half.x;
+        let y = vec3<f32>(n.y, a.y, b.y) * half.y;
+        let z = vec3<f32>(n.z, a.z, b.z) * half.z;
         var low = vec2<f32>(1e30);
         var high = vec2<f32>(-1e30);
         for (var k = 0u; k < 8u; k++) {
-            let corner = select(-half, half, (vec3<u32>(k) & vec3<u32>(1u, 2u, 4u)) != vec3<u32>(0u));
-            let to = middle + corner - at.p;
-            // Where the ray to the corner crosses the window's plane, from its corner.
-            let q = at.p + to * (height / max(-dot(n, to), height)) - lights[w].p;
-            let a = dot(q, u);
-            let b = dot(q, v);
-            let place = vec2<f32>(a * vv - b * uv, b * uu - a * uv) / (uu * vv - uv * uv);
+            let way = to + select(x, -x, (k & 1u) == 0u) + select(y, -y, (k & 2u) == 0u) + select(z, -z, (k & 4u) == 0u);
+            // Where the ray to the corner crosses the window's plane.
+            let place = eye.yz + way.yz * (eye.x / max(-way.x, eye.x));
             low = min(low, place);
             high = max(high, place);
         }

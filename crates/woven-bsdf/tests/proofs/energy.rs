@@ -55,8 +55,12 @@ fn the_sheet_never_gives_more_than_it_gets() {
     let sheet = find("sheet").unwrap();
     let mut rng = Rng::new(41);
     let mut worst = (0.0f64, String::new());
-    for _ in 0..settings(60) {
-        let values = rng.parameters(sheet, 0.0);
+    for i in 0..settings(60) {
+        let mut values = rng.parameters(sheet, 0.0);
+        if i % 3 == 0 {
+            // Tapes, which close only at grazing incidence: there the cover that a tilt adds is far from its mean.
+            values[7] *= 1e-3f64.powf(rng.unit());
+        }
         let (_, s) = sheet.split(&values);
         let l = rng.direction(0.01);
         let gap = Sheet::gap(&s, l);

@@ -52,6 +52,8 @@ pub struct Stage {
     scene: Scene,
     curtain: usize,
     cloth: usize,
+    /// Number of the room's own textures; the curtain's follow them.
+    textures: usize,
 }
 
 impl Stage {
@@ -82,6 +84,7 @@ impl Stage {
             ..camera()
         };
         Self {
+            textures: scene.textures.len(),
             scene,
             curtain,
             cloth,
@@ -108,10 +111,17 @@ impl Stage {
             (positions, normals, uvs, indices);
     }
 
-    /// Weaves the curtain of another material; its name stays "curtain".
-    pub fn set_material(&mut self, material: Material) {
+    /// Weaves the curtain of another material, which may be covered by one of `textures`, its own; its name stays "curtain".
+    pub fn set_material(&mut self, material: Material, textures: &[Texture]) {
+        self.scene.textures.truncate(self.textures);
+        self.scene.textures.extend_from_slice(textures);
+        let coverage_texture = material.coverage_texture.map(|cover| TextureUse {
+            texture: self.textures + cover.texture,
+            ..cover
+        });
         self.scene.materials[self.cloth] = Material {
             name: "curtain".to_owned(),
+            coverage_texture,
             ..material
         };
     }
@@ -121,9 +131,9 @@ impl Stage {
     /// # Errors
     /// A sentence when the fabric cannot be rendered.
     pub fn dress(&mut self, fabric: &Fabric, folder: &Path) -> Result<()> {
-        let mut material = Material::matt("curtain", [0.0; 3]);
-        wear(&mut material, fabric, folder, &mut self.scene.textures)?;
-        self.set_material(material);
+        let (mut material, mut textures) = (Material::matt("curtain", [0.0; 3]), Vec::new());
+        wear(&mut material, fabric, folder, &mut textures)?;
+        self.set_material(material, &textures);
         Ok(())
     }
 

@@ -5,6 +5,7 @@ mod creases;
 mod distance;
 mod folds;
 mod guard;
+mod motions;
 mod net;
 mod obstacles;
 mod patches;

@@ -202,9 +202,8 @@ impl Yarns {
     }
 
     /// Where the yarns shade one repeat of the sheet from a beam along `w`: the shadows of all centre points, in cells of
-    /// 1/`cells` of a pitch, row after row along the weft; what falls over an edge comes in at the other. A cell is dark
-    /// if one point of it is, which lies elsewhere in each row and column: with the middles of all cells, the straight
-    /// edge of a yarn would add or take a whole line of them.
+    /// 1/`cells` of a pitch, row after row along the weft; what falls over an edge comes in at the other. A cell is as dark
+    /// as one point of it, elsewhere in each row and column, or else the edge of a yarn would count in whole lines.
     pub fn shadow(&self, w: Vec3<f64>, cells: usize) -> ([usize; 2], Vec<bool>) {
         let n = [0, 1].map(|a| ((self.repeat[a] / self.gauges[a].pitch).round() as usize) * cells);
         let size = [0, 1].map(|a| self.repeat[a] / n[a] as f64);
@@ -213,11 +212,7 @@ impl Yarns {
         let (slope_x, slope_y) = (w.x * slope, w.y * slope);
         // In a space where sections are round, the shadow of a ball is an ellipse 1/cos long and 1 wide.
         let sin = w.x.hypot(w.y);
-        let (c, s) = if sin > 1e-12 {
-            (w.x / sin, w.y / sin)
-        } else {
-            (1.0, 0.0)
-        };
+        let (s, c) = w.y.atan2(w.x).sin_cos();
         let cos = (z / self.section) / (z / self.section).hypot(sin);
         let mut dark = vec![false; n[0] * n[1]];
         let golden = |i: usize| (i as f64 * 0.618_033_988_749_894_9).fract();
@@ -270,7 +265,7 @@ impl Yarns {
     /// The straight yarns whose openness is closest to this geometry over 0…60°, by the greatest difference.
     pub fn aggregate(&self) -> Aggregate {
         let directions: Vec<Vec3<f64>> = std::iter::once(Vec3::new(0.0, 0.0, 1.0))
-            .chain([20.0, 40.0, 50.0, 60.0].into_iter().flat_map(|deg| {
+            .chain([20.0, 30.0, 40.0, 50.0, 60.0].into_iter().flat_map(|deg| {
                 let azimuth = |j: i32| f64::from(j) * FRAC_PI_4 / 4.0;
                 (0..9).map(move |j| Vec3::from_angles(radians(deg), azimuth(j)))
             }))
@@ -287,20 +282,20 @@ impl Yarns {
             sum.powf(1.0 / 12.0)
         };
         let gamma = self.gauges.map(|g| (g.diameter / g.pitch).min(1.0));
-        let starts = [0.6, 0.8, 1.0, 1.25, 1.6].map(|s| [gamma[0], gamma[1], self.section * s]);
-        let mut best = (starts[2], f64::INFINITY);
-        for start in starts {
+        let mut best = ([gamma[0], gamma[1], self.section], f64::INFINITY);
+        for k in 0..10 {
+            let (more, s) = (0.05 * (k / 5) as f64, [0.6, 0.8, 1.0, 1.25, 1.6][k % 5]);
+            let start = [gamma[0] + more, gamma[1] + more, self.section * s];
             let x = descend(descend(start, 0.08, &smooth), 0.02, &greatest);
-            let e = greatest(&x);
-            if e < best.1 {
-                best = (x, e);
+            if greatest(&x) < best.1 {
+                best = (x, greatest(&x));
             }
         }
-        let ([gamma_warp, gamma_weft, section], error) = best;
+        let (best, error) = best;
         Aggregate {
-            gamma_warp,
-            gamma_weft,
-            section,
+            gamma_warp: best[0],
+            gamma_weft: best[1],
+            section: best[2],
             error,
         }
     }

@@ -71,8 +71,10 @@ fn the_widths_that_the_descriptions_name() {
             "{name} {values:?}: {got:.2}° instead of {degrees}°"
         );
     }
-    let along_y = half_width("ggx-mirrored", &[0.0, 1.0, 0.3, 0.1], true);
-    assert!((along_y / 7.5 - 1.0).abs() < 0.04, "{along_y}");
+    for (name, degrees) in [("ggx-mirrored", 7.5), ("ward", 9.6)] {
+        let along_y = half_width(name, &[0.0, 1.0, 0.3, 0.1], true);
+        assert!((along_y / degrees - 1.0).abs() < 0.04, "{name}: {along_y}");
+    }
 }
 
 #[test]

@@ -168,7 +168,9 @@ pub fn all(result: &FitResult) -> Vec<(String, Drawing)> {
             residual_chart(points, &slice, &models),
         ));
     }
-    if let Some(fit) = result.sheet().filter(|f| f.has_gap) {
+    // Over one incidence a chart says nothing.
+    let slanted = points.incidences.len() > 1;
+    if let Some(fit) = result.sheet().filter(|f| f.has_gap && slanted) {
         out.push(("gap".to_owned(), gap_drawing(points, fit)));
     }
     out

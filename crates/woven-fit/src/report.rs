@@ -151,7 +151,8 @@ pub fn html(result: &FitResult, command: &str) -> String {
     for slice in slices.iter().take(4) {
         s += &residual_chart(points, slice, &models).to_string();
     }
-    if let Some(fit) = result.sheet().filter(|f| f.has_gap) {
+    let slanted = points.incidences.len() > 1;
+    if let Some(fit) = result.sheet().filter(|f| f.has_gap && slanted) {
         s += &gap_chart(points, fit);
     }
     s += "</div>";

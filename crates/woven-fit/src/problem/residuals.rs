@@ -39,6 +39,8 @@ pub struct Separable<'a> {
     pub weights: Vec<f64>,
     /// Best factors at the last evaluation, zeros where the bound k ≥ 0 holds them.
     pub k: Vec<f64>,
+    /// Where that was.
+    at: Vec<f64>,
     table: Table,
 }
 
@@ -49,6 +51,7 @@ impl<'a> Separable<'a> {
             eval,
             weights,
             k: vec![0.0; eval.spec.linear.len()],
+            at: Vec::new(),
             table: Table::default(),
         }
     }
@@ -56,8 +59,10 @@ impl<'a> Separable<'a> {
     /// Best factors at `x`, which must be a place that can be evaluated. A solver's last evaluation may have been a step that
     /// it refused, so `k` is not asked after it.
     pub fn factors_at(&mut self, x: &[f64]) -> Vec<f64> {
-        let mut r = vec![0.0; self.rows()];
-        self.evaluate(x, &mut r, None);
+        if self.at != x {
+            let mut r = vec![0.0; self.rows()];
+            self.evaluate(x, &mut r, None);
+        }
         self.k.clone()
     }
 }
@@ -97,6 +102,8 @@ impl Residuals for Separable<'_> {
                 .for_each(|(r, c)| *r += k[j] * c);
         }
         self.k = k;
+        self.at.clear();
+        self.at.extend_from_slice(x);
         let Some(jac) = jac else { return true };
         // Golub–Pereyra: ∂r = P⊥(∂Φ k + ∂fixed) - (Φ⁺)ᵀ ∂Φᵀ r, over the positive factors.
         let used: Vec<&[f64]> = set.iter().map(|&j| columns[j]).collect();

@@ -5,9 +5,9 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use woven_bsdf::fabric::Fabric;
 use woven_catalog::catalog::Catalog;
+use woven_catalog::cloth;
 use woven_catalog::picture::{Choice, Photographer, Shoot};
 use woven_catalog::stage::{Preset, Stage};
-use woven_catalog::{cloth, optics};
 
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -40,7 +40,8 @@ fn main() -> Result<()> {
         .context("the frame is a number")?;
     let mut stage = Stage::new(light).with_curtain(cloth::mesh(&clip, None));
     if let Some(path) = words.get(4) {
-        stage.set_material(optics::material(&Fabric::read(Path::new(path))?)?);
+        let path = Path::new(path);
+        stage.dress(&Fabric::read(path)?, path.parent().unwrap_or(path))?;
     }
     let photographer = Photographer::choose(Choice::Cpu)?;
     let began = std::time::Instant::now();

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
+use woven_bsdf::fabric::Fabric;
 
 use crate::assets;
 use crate::stage::Preset;
@@ -53,8 +54,13 @@ pub struct FabricSpec {
     /// A sentence about it.
     #[serde(default)]
     pub lead: String,
-    /// The measurement: a file beside the catalog, or `builtin:NAME` for one that this program carries.
+    /// The measurement, which will be fitted: a file beside the catalog, or `builtin:NAME` for one that this program carries.
+    #[serde(default)]
     pub measurement: String,
+    /// Instead of a measurement, a fabric file beside the catalog: from `woven-fit fit`, from a maker's numbers, or written by hand. Its
+    /// map of openness and the colours of its other side are rendered with it.
+    #[serde(default)]
+    pub fabric_file: String,
     /// Where the measurement comes from.
     #[serde(default)]
     pub source: String,
@@ -265,6 +271,10 @@ impl Catalog {
                 fabric.grams.is_none_or(|g| (5.0..=2000.0).contains(&g)),
                 "fabric \"{id}\": grams must lie between 5 and 2000"
             );
+            ensure!(
+                fabric.measurement.is_empty() != fabric.fabric_file.is_empty(),
+                "fabric \"{id}\" must have either a `measurement`, which is fitted, or a `fabric_file`"
+            );
             if let Some(tint) = fabric.tint {
                 ensure!(
                     tint.iter()
@@ -324,9 +334,9 @@ impl Catalog {
     }
 }
 
-/// A measurement as bytes with a name for people.
+/// What a fabric is made from, as bytes with a name for people: a measurement or a fabric file.
 #[derive(Clone, Debug)]
-pub struct Measurement {
+pub struct Source {
     /// The file's name without folders.
     pub file: String,
     /// Where it was read; the bare name for one that this program carries.
@@ -335,14 +345,16 @@ pub struct Measurement {
     pub bytes: Vec<u8>,
     /// True for one that this program carries and may put beside the page.
     pub builtin: bool,
+    /// The map of openness that a fabric file names, with its contents.
+    pub map: Option<(String, Vec<u8>)>,
 }
 
 impl FabricSpec {
-    /// The measurement; `folder` is where the catalog lies.
+    /// The measurement or the fabric file; `folder` is where the catalog lies.
     ///
     /// # Errors
     /// A sentence that names the file.
-    pub fn measurement(&self, folder: &Path) -> Result<Measurement> {
+    pub fn source(&self, folder: &Path) -> Result<Source> {
         if let Some(name) = self.measurement.strip_prefix("builtin:") {
             let Some(bytes) = assets::measurement(name) else {
                 bail!(
@@ -351,32 +363,59 @@ impl FabricSpec {
                     assets::names().join(", ")
                 );
             };
-            return Ok(Measurement {
+            return Ok(Source {
                 file: name.to_owned(),
                 path: PathBuf::from(name),
                 bytes: bytes.to_vec(),
                 builtin: true,
+                map: None,
             });
         }
-        let path: PathBuf = folder.join(&self.measurement);
-        let bytes = std::fs::read(&path).with_context(|| {
-            format!(
-                "The measurement {} of fabric \"{}\" cannot be read",
-                path.display(),
-                self.id
-            )
-        })?;
-        let file = path.file_name().map_or_else(
-            || "measurement".to_owned(),
-            |n| n.to_string_lossy().into_owned(),
-        );
-        Ok(Measurement {
+        let read = |path: &Path, what: &str| {
+            std::fs::read(path).with_context(|| {
+                format!(
+                    "The {what} {} of fabric \"{}\" cannot be read",
+                    path.display(),
+                    self.id
+                )
+            })
+        };
+        let (what, name) = if self.fabric_file.is_empty() {
+            ("measurement", &self.measurement)
+        } else {
+            ("fabric file", &self.fabric_file)
+        };
+        let path = folder.join(name);
+        let bytes = read(&path, what)?;
+        let map = if self.fabric_file.is_empty() {
+            None
+        } else {
+            openness_map(&Fabric::read(&path)?)
+                .map(|map| {
+                    anyhow::Ok((
+                        map.to_owned(),
+                        read(&path.with_file_name(map), "openness map")?,
+                    ))
+                })
+                .transpose()?
+        };
+        let file = path
+            .file_name()
+            .map_or_else(|| what.to_owned(), |n| n.to_string_lossy().into_owned());
+        Ok(Source {
             file,
             path,
             bytes,
             builtin: false,
+            map,
         })
     }
+}
+
+/// The name of the fabric's map of openness, if it has one.
+fn openness_map(fabric: &Fabric) -> Option<&str> {
+    let weave = fabric.weave.as_ref()?;
+    Some(weave.openness_map.as_str()).filter(|name| !name.is_empty())
 }
 
 #[cfg(test)]
@@ -398,14 +437,7 @@ mod tests {
         assert!(catalog.motion.frames >= 48 && catalog.motion.frames >= 2 * catalog.motion.fps);
         assert!(catalog.picture.size[0] >= 480 && catalog.picture.size[1] >= 360);
         for fabric in &catalog.fabrics {
-            assert!(
-                fabric
-                    .measurement(Path::new("nowhere"))
-                    .unwrap()
-                    .bytes
-                    .len()
-                    > 10_000
-            );
+            assert!(fabric.source(Path::new("nowhere")).unwrap().bytes.len() > 10_000);
             assert!(!fabric.licence.is_empty() && !fabric.source.is_empty());
         }
     }
@@ -432,16 +464,12 @@ mod tests {
     fn a_missing_measurement_is_named() {
         let mut fabric = Catalog::parse(SMALL).unwrap().fabrics.remove(0);
         assert!(
-            format!(
-                "{:#}",
-                fabric.measurement(Path::new("nowhere")).unwrap_err()
-            )
-            .contains("a.xml")
+            format!("{:#}", fabric.source(Path::new("nowhere")).unwrap_err()).contains("a.xml")
         );
         fabric.measurement = "builtin:velvet.xml".to_owned();
         assert!(
             fabric
-                .measurement(Path::new("nowhere"))
+                .source(Path::new("nowhere"))
                 .unwrap_err()
                 .to_string()
                 .contains("there are only")

@@ -1,15 +1,16 @@
-//! From a measurement to a fabric: the fit, what the page tells of it, and the material that the renderer wants.
+//! From a measurement to a fabric, or a fabric file as it is: the fit, and what the page tells of it.
 
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
 use woven_bsdf::fabric::Fabric;
+use woven_bsdf::measured::shop::Shop;
 use woven_fit::figures::{gap_chart, polar_plot, slice_chart, slices};
 use woven_fit::fit::{FitResult, ModelFit, Options, fit_measurement};
 use woven_fit::plot::Scale;
 use woven_fit::report;
-use woven_render::scene::{MAX_LINEAR, MAX_SHAPE, Material};
+use woven_render::scene::fabric::openness_map;
 
 use crate::catalog::{FabricSpec, Fit};
 
@@ -66,8 +67,52 @@ pub struct Fitted {
     pub fabric: Fabric,
     /// What the page tells.
     pub summary: Summary,
-    /// The whole report as one HTML page.
-    pub report: String,
+    /// The whole report as one HTML page, where something was fitted.
+    pub report: Option<String>,
+}
+
+/// Takes the fabric file at `path` as it is.
+///
+/// # Errors
+/// A sentence when it cannot be used.
+pub fn ready(path: &Path, spec: &FabricSpec) -> Result<Fitted> {
+    let mut fabric = Fabric::read(path)?;
+    let own = std::mem::replace(&mut fabric.name, spec.name.clone());
+    if let Some(tint) = spec.tint {
+        color(&mut fabric, tint);
+    }
+    let optics = fabric.optics()?;
+    let [_, shop, _] = Shop::of_sheet(&optics)
+        .with_context(|| format!("Fabric \"{}\" cannot be rendered", spec.id))?;
+    let mut openness = shop.tau_nn;
+    if let Some(weave) = fabric.weave.as_ref().filter(|w| !w.openness_map.is_empty()) {
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        let holes = openness_map(folder, &weave.openness_map)?.mean();
+        openness = if weave.map_multiplies {
+            holes * openness
+        } else {
+            1.0 - (1.0 - holes) * (1.0 - openness)
+        };
+    }
+    let parameters = optics.model.params.iter().filter_map(|p| {
+        Some(Parameter {
+            name: p.name.to_owned(),
+            meaning: p.meaning.to_owned(),
+            value: *fabric.optics.parameters.get(p.name)?,
+            error: None,
+        })
+    });
+    let summary = Summary {
+        name: own,
+        openness,
+        parameters: parameters.collect(),
+        ..Summary::default()
+    };
+    Ok(Fitted {
+        fabric,
+        summary,
+        report: None,
+    })
 }
 
 /// Fits the measurement at `path`. `progress(share)` answers false to stop.
@@ -121,7 +166,7 @@ pub fn fit(
     Ok(Fitted {
         fabric,
         summary,
-        report: report::html(&result, &command),
+        report: Some(report::html(&result, &command)),
     })
 }
 
@@ -220,31 +265,4 @@ fn rows(fit: &ModelFit) -> impl Iterator<Item = Parameter> + '_ {
             error: p.standard_error,
         }
     })
-}
-
-/// The renderer's material of a fabric.
-///
-/// # Errors
-/// When the fabric's model is not the sheet, or a parameter is out of its range.
-pub fn material(fabric: &Fabric) -> Result<Material> {
-    let optics = fabric.optics()?;
-    anyhow::ensure!(
-        optics.model.name == "sheet",
-        "The fabric \"{}\" has the model {}; only the sheet can be rendered.",
-        fabric.name,
-        optics.model.name
-    );
-    let mut material = Material::matt(&fabric.name, [0.0; 3]);
-    for (to, from) in material
-        .linear
-        .iter_mut()
-        .zip(&optics.linear)
-        .take(MAX_LINEAR)
-    {
-        *to = from.map(|c| c as f32);
-    }
-    for (to, from) in material.shape.iter_mut().zip(&optics.shape).take(MAX_SHAPE) {
-        *to = *from as f32;
-    }
-    Ok(material)
 }

@@ -158,7 +158,10 @@ impl FabricPart {
         if let Some(desk) = &self.desk {
             desk.html(&self.id, out);
         }
-        out.push_str("<div class=\"measured\">\n<div>\n<h3>Measured and fitted</h3>\n");
+        out.push_str("<div class=\"measured\">\n<div>\n");
+        if !self.plots.is_empty() || self.report.is_some() {
+            out.push_str("<h3>Measured and fitted</h3>\n");
+        }
         for (caption, svg) in &self.plots {
             // An SVG of ours goes in as it is; a declaration before it would not be HTML.
             let svg = svg.find("<svg").map_or("", |at| &svg[at..]);
@@ -175,7 +178,7 @@ impl FabricPart {
                 escape(report)
             );
         }
-        out.push_str("</div>\n<div>\n<h3>The fitted sheet</h3>\n<div class=\"scroll\"><table>\n<thead><tr><th>Parameter</th><th class=\"n\">Value</th><th class=\"n\">± standard error</th></tr></thead>\n<tbody>\n");
+        out.push_str("</div>\n<div>\n<h3>The sheet</h3>\n<div class=\"scroll\"><table>\n<thead><tr><th>Parameter</th><th class=\"n\">Value</th><th class=\"n\">± standard error</th></tr></thead>\n<tbody>\n");
         for row in &self.parameters {
             let (value, error) = plus_minus(row.value, row.error);
             let unit = if row.unit.is_empty() {

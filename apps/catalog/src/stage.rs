@@ -15,7 +15,12 @@ mod room;
 mod shape;
 mod texture;
 
+use std::path::Path;
+
+use anyhow::Result;
 use glam::{Vec2, Vec3};
+use woven_bsdf::fabric::Fabric;
+use woven_render::scene::fabric::wear;
 use woven_render::scene::{
     Camera, LAYER_LAMPS, LAYER_SKY, Material, Mesh, Scene, Texture, TextureUse,
 };
@@ -47,6 +52,8 @@ pub struct Stage {
     scene: Scene,
     curtain: usize,
     cloth: usize,
+    /// Number of the room's own textures; the curtain's follow them.
+    textures: usize,
 }
 
 impl Stage {
@@ -77,6 +84,7 @@ impl Stage {
             ..camera()
         };
         Self {
+            textures: scene.textures.len(),
             scene,
             curtain,
             cloth,
@@ -103,12 +111,30 @@ impl Stage {
             (positions, normals, uvs, indices);
     }
 
-    /// Weaves the curtain of another material; its name stays "curtain".
-    pub fn set_material(&mut self, material: Material) {
+    /// Weaves the curtain of another material, which may be covered by one of `textures`, its own; its name stays "curtain".
+    pub fn set_material(&mut self, material: Material, textures: &[Texture]) {
+        self.scene.textures.truncate(self.textures);
+        self.scene.textures.extend_from_slice(textures);
+        let coverage_texture = material.coverage_texture.map(|cover| TextureUse {
+            texture: self.textures + cover.texture,
+            ..cover
+        });
         self.scene.materials[self.cloth] = Material {
             name: "curtain".to_owned(),
+            coverage_texture,
             ..material
         };
+    }
+
+    /// Weaves the curtain of a fabric, whose map of openness lies in `folder`.
+    ///
+    /// # Errors
+    /// A sentence when the fabric cannot be rendered.
+    pub fn dress(&mut self, fabric: &Fabric, folder: &Path) -> Result<()> {
+        let (mut material, mut textures) = (Material::matt("curtain", [0.0; 3]), Vec::new());
+        wear(&mut material, fabric, folder, &mut textures)?;
+        self.set_material(material, &textures);
+        Ok(())
     }
 
     /// The scene to render.

@@ -66,7 +66,7 @@ fn fabric(catalog: &Catalog, s: &Subject) -> FabricPart {
     if spec.tint.is_some() {
         notes.push("The measurement has one band (luminous), no colour: the hue in the pictures is chosen by the name of the article, the level of light is the measured one.".to_owned());
     }
-    notes.push(format!("Weight and stiffness are not in the measurement: the curtain is simulated as the class \"{}\" of woven-cloth's table.", spec.mechanics));
+    notes.push(format!("Weight and stiffness were not measured: the curtain is simulated as the class \"{}\" of woven-cloth's table.", spec.mechanics));
     FabricPart {
         id: spec.id.clone(),
         name: spec.name.clone(),
@@ -75,7 +75,10 @@ fn fabric(catalog: &Catalog, s: &Subject) -> FabricPart {
         shots: shots(catalog, s),
         desk: Some(desk::desk(&spec.id, &spec.name, size)),
         plots: s.summary.plots.clone(),
-        report: Some(format!("{}/fit.html", spec.id)),
+        report: spec
+            .fabric_file
+            .is_empty()
+            .then(|| format!("{}/fit.html", spec.id)),
         parameters: s.summary.parameters.iter().map(row).collect(),
         notes,
         ranking: ranking(s),
@@ -164,20 +167,30 @@ fn ranking(s: &Subject) -> Option<(Vec<String>, Vec<Vec<String>>)> {
 }
 
 fn provenance(s: &Subject) -> Vec<(String, String)> {
-    let file = if s.measurement.builtin {
-        format!(
-            "{} (beside this page in {}/)",
-            s.measurement.file, s.spec.id
-        )
+    let source = &s.source;
+    let file = if source.builtin {
+        format!("{} (beside this page in {}/)", source.file, s.spec.id)
     } else {
-        s.measurement.file.clone()
+        source.file.clone()
     };
-    pairs([
-        ("Measurement", file),
+    let map = source.map.as_ref();
+    let what = if s.spec.fabric_file.is_empty() {
+        "Measurement"
+    } else {
+        "Made from the fabric file"
+    };
+    let mut rows = pairs([
+        (what, file),
         ("Name in the file", s.summary.name.clone()),
         ("Source", s.spec.source.clone()),
         ("Licence", s.spec.licence.clone()),
-        ("SHA-256", sha256(&s.measurement.bytes)),
+        ("SHA-256", sha256(&source.bytes)),
+        (
+            "Map of openness",
+            map.map_or_else(String::new, |(name, bytes)| {
+                format!("{}/{name}, SHA-256 {}", s.spec.id, sha256(bytes))
+            }),
+        ),
         (
             "Fabric file",
             format!("{}/fabric.toml, SHA-256 {}", s.spec.id, s.fabric_hash),
@@ -186,5 +199,10 @@ fn provenance(s: &Subject) -> Vec<(String, String)> {
             "Curtain",
             format!("{}/curtain.glb, SHA-256 {}", s.spec.id, s.clip_hash),
         ),
-    ])
+    ]);
+    if !s.spec.fabric_file.is_empty() {
+        let own = s.fabric.provenance.iter();
+        rows.extend(own.map(|(label, text)| (label.clone(), text.clone())));
+    }
+    rows
 }

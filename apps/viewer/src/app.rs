@@ -332,6 +332,7 @@ impl Viewer {
         let scene = Look {
             preset: self.preset,
             cloth: self.woven,
+            pattern: self.cloth.pattern.clone(),
             curtain: Arc::clone(&self.curtain),
             camera: self.orbit.camera(0.0),
             backend: self.backend,

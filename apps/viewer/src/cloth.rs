@@ -1,7 +1,10 @@
 //! The cloth on the sliders: a model, its values and colours, and the way from and to a fabric file.
 
+mod pattern;
+
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use woven_bsdf::fabric::{Fabric, OpticsTable, WeaveTable};
 use woven_bsdf::measured::Refused;
@@ -10,6 +13,7 @@ use woven_bsdf::sheet;
 use woven_bsdf::vec3::Vec3;
 
 use crate::nearest::{Woven, nearest};
+pub use pattern::Pattern;
 
 /// Luminance of linear Rec. 709.
 #[must_use]
@@ -59,6 +63,8 @@ pub struct Cloth {
     pub colors: Vec<[f64; 3]>,
     /// Diffuse reflection given to models that know transmission only.
     pub reflect: f64,
+    /// The file's map of openness.
+    pub pattern: Option<Arc<Pattern>>,
     opened: Option<Setting>,
 }
 
@@ -74,10 +80,16 @@ impl Default for Cloth {
                 values: model.start(),
                 colors: white(model),
                 reflect: 0.4,
+                pattern: None,
                 opened: None,
             }
         })
     }
+}
+
+/// Under which name a fabric file has a parameter's colour on the other side.
+fn back_of(p: &Param) -> String {
+    format!("{}_back", p.name)
 }
 
 fn white(model: &ModelInfo) -> Vec<[f64; 3]> {
@@ -85,12 +97,17 @@ fn white(model: &ModelInfo) -> Vec<[f64; 3]> {
 }
 
 impl Cloth {
-    /// Reads a fabric file.
+    /// Reads a fabric file, and the map of openness beside it.
     ///
     /// # Errors
     /// A sentence with the file and the field.
     pub fn open(path: &Path) -> Result<Self, Refused> {
-        Self::of(Fabric::read(path)?)
+        let fabric = Fabric::read(path)?;
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        let pattern = Pattern::of(&fabric, folder).map_err(|e| Refused::new(format!("{e:#}")))?;
+        let mut cloth = Self::of(fabric)?;
+        cloth.pattern = pattern.map(Arc::new);
+        Ok(cloth)
     }
 
     /// The cloth of a fabric.
@@ -121,6 +138,7 @@ impl Cloth {
             values,
             colors,
             reflect: 0.4,
+            pattern: None,
             opened: None,
         };
         cloth.opened = Some(cloth.setting());
@@ -191,12 +209,30 @@ impl Cloth {
         if self.model.name != "sheet" {
             return 0.0;
         }
-        let sum = |c: usize| {
+        let sum = |c: usize, back: bool| {
             self.params(Role::Linear)
-                .map(|(i, _)| self.values[i] * self.colors[i][c])
+                .map(|(i, _)| self.values[i] * self.color(i, back)[c])
                 .sum::<f64>()
         };
-        (0..3).map(sum).fold(0.0, f64::max)
+        let sums = (0..3).flat_map(|c| [sum(c, false), sum(c, true)]);
+        sums.fold(0.0, f64::max)
+    }
+
+    /// The colour of a parameter on the front, or on the side away from +z, where the file may have one of its own.
+    fn color(&self, index: usize, back: bool) -> [f64; 3] {
+        let own = self.backs().find(|(i, _)| back && *i == index);
+        own.map_or(self.colors[index], |(_, color)| color)
+    }
+
+    /// The parameters of which the file has a colour for the other side, with that colour; sliders do not change it.
+    fn backs(&self) -> impl Iterator<Item = (usize, [f64; 3])> + '_ {
+        let same = self.fabric.optics.model == self.model.name;
+        self.params(Role::Linear)
+            .filter(move |_| same)
+            .filter_map(|(i, p)| {
+                let colors = &self.fabric.optics.colors;
+                colors.get(&back_of(p)).map(|color| (i, *color))
+            })
     }
 
     /// By what the factors are multiplied so that the yarn gives no more than it gets.
@@ -204,14 +240,20 @@ impl Cloth {
         1.0 / self.given().max(1.0)
     }
 
-    /// The coloured linear factors as they are used, and the prepared shape.
-    #[must_use]
-    pub fn optics(&self) -> ([[f64; 3]; MAX_LINEAR], Shape<f64>) {
+    /// The coloured linear factors of a side, as they are used.
+    fn linear(&self, back: bool) -> [[f64; 3]; MAX_LINEAR] {
         let share = self.share();
         let mut linear = [[0.0; 3]; MAX_LINEAR];
         for (k, (i, _)) in linear.iter_mut().zip(self.params(Role::Linear)) {
-            *k = self.colors[i].map(|c| c * self.values[i] * share);
+            *k = self.color(i, back).map(|c| c * self.values[i] * share);
         }
+        linear
+    }
+
+    /// The coloured linear factors as they are used, and the prepared shape.
+    #[must_use]
+    pub fn optics(&self) -> ([[f64; 3]; MAX_LINEAR], Shape<f64>) {
+        let linear = self.linear(false);
         let shape: Vec<f64> = self
             .params(Role::Shape)
             .map(|(i, _)| self.values[i])
@@ -230,7 +272,11 @@ impl Cloth {
     #[must_use]
     pub fn woven(&self) -> Woven {
         let (linear, shape) = self.optics();
-        nearest(self.model, &linear, &shape, self.reflect)
+        let two_sided = self.model.name == "sheet" && self.backs().next().is_some();
+        Woven {
+            back: two_sided.then(|| self.linear(true)),
+            ..nearest(self.model, &linear, &shape, self.reflect)
+        }
     }
 
     /// The straight-through share for a beam along `w`; 0 for models that have no weave.
@@ -265,6 +311,9 @@ impl Cloth {
                 optics.colors.insert(p.name.to_owned(), self.colors[i]);
             }
         }
+        for (i, color) in self.backs() {
+            optics.colors.insert(back_of(&self.model.params[i]), color);
+        }
         let mut fabric = Fabric {
             name: name.to_owned(),
             optics,
@@ -277,7 +326,15 @@ impl Cloth {
             );
         }
         if self.weave_contradicts() {
-            fabric.weave = None;
+            // A map of openness cannot be without the table: then the yarns follow the sliders.
+            fabric.weave = fabric.weave.filter(|w| !w.openness_map.is_empty());
+            if let Some(weave) = &mut fabric.weave {
+                let gamma = |name| fabric.optics.parameters.get(name);
+                if let (Some(warp), Some(weft)) = (gamma("gamma_warp"), gamma("gamma_weft")) {
+                    weave.warp_diameter_mm = warp * weave.warp_pitch_mm;
+                    weave.weft_diameter_mm = weft * weave.weft_pitch_mm;
+                }
+            }
         }
         fabric
     }

@@ -13,6 +13,8 @@ use woven_bsdf::vec3::Vec3;
 pub struct Woven {
     /// Linear factors of the sheet, RGB.
     pub linear: [[f64; 3]; MAX_LINEAR],
+    /// The same on the side away from +z, where it has colours of its own.
+    pub back: Option<[[f64; 3]; MAX_LINEAR]>,
     /// Prepared shape of the sheet.
     pub shape: Shape<f64>,
     /// Root mean square misfit as a share of the model's root mean square; 0 when the model is the sheet.
@@ -120,6 +122,7 @@ pub fn nearest(
     if model.name == Sheet::NAME {
         return Woven {
             linear: *k,
+            back: None,
             shape: *s,
             misfit: 0.0,
         };
@@ -200,6 +203,7 @@ pub fn nearest(
     };
     Woven {
         linear: out,
+        back: None,
         shape: closed(alpha[0], alpha[1]),
         misfit,
     }

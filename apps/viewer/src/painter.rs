@@ -3,11 +3,13 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use woven_bsdf::model::MAX_LINEAR;
 use woven_catalog::stage::{CurtainMesh, Preset, Stage};
 use woven_render::film::Film;
 use woven_render::render::{Backend, Renderer, Settings};
-use woven_render::scene::{Camera, Material};
+use woven_render::scene::{Camera, Material, Texture};
 
+use crate::cloth::Pattern;
 use crate::nearest::Woven;
 use crate::worker::Painter;
 
@@ -23,6 +25,8 @@ pub struct Look {
     pub preset: Preset,
     /// The cloth's material.
     pub cloth: Woven,
+    /// What covers it beside its weave.
+    pub pattern: Option<Arc<Pattern>>,
     /// The curtain as it hangs.
     pub curtain: Arc<CurtainMesh>,
     /// The eye.
@@ -32,15 +36,32 @@ pub struct Look {
 }
 
 impl Look {
-    fn material(&self) -> Material {
-        let mut material = Material::matt("curtain", [0.0; 3]);
-        for (to, from) in material.linear.iter_mut().zip(&self.cloth.linear) {
-            *to = from.map(|k| k as f32);
+    /// The cloth's material, and its own texture if it has one.
+    fn material(&self) -> (Material, &[Texture]) {
+        let single = |linear: [[f64; 3]; MAX_LINEAR]| linear.map(|k| k.map(|v| v as f32));
+        let material = Material {
+            linear: single(self.cloth.linear),
+            back: self.cloth.back.map(single),
+            shape: self.cloth.shape.map(|v| v as f32),
+            ..Material::matt("curtain", [0.0; 3])
+        };
+        match &self.pattern {
+            None => (material, &[]),
+            Some(pattern) => {
+                let (material, texture) = pattern.cover(material);
+                (material, std::slice::from_ref(texture))
+            }
         }
-        for (to, from) in material.shape.iter_mut().zip(&self.cloth.shape) {
-            *to = *from as f32;
-        }
-        material
+    }
+
+    /// Whether another look has the same cloth.
+    fn same_cloth(&self, other: &Self) -> bool {
+        let same_pattern = match (&self.pattern, &other.pattern) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        self.cloth == other.cloth && same_pattern
     }
 }
 
@@ -69,7 +90,7 @@ impl StagePainter {
 
     /// Moves camera and curtain of the renderers that are there; false when they have to be made anew.
     fn moved(&mut self, old: &Look, new: &Look) -> Result<bool, String> {
-        let same = old.preset == new.preset && old.backend == new.backend && old.cloth == new.cloth;
+        let same = old.preset == new.preset && old.backend == new.backend && old.same_cloth(new);
         if !same
             || old.curtain.indices != new.curtain.indices
             || old.curtain.positions.len() != new.curtain.positions.len()
@@ -136,7 +157,8 @@ impl Painter for StagePainter {
             self.renderers.clear();
         }
         let stage = self.stage(look.preset);
-        stage.set_material(look.material());
+        let (material, textures) = look.material();
+        stage.set_material(material, textures);
         stage.set_curtain((*look.curtain).clone());
         stage.scene_mut().camera = look.camera;
         self.look = Some(look.clone());

@@ -1,8 +1,9 @@
 //! A close-up of a weave for any renderer: `cargo run -p woven-bsdf --example close_up -- twill out.gltf`, then for
 //! instance `woven-render frame out.gltf -o twill.png`. Weaves: plain, twill, satin, leno, lace.
 //!
-//! The yarns are the tubes of `weave::yarns`, 0.4 mm apart and enlarged a thousandfold (a millimetre is a metre), with
-//! a camera, a lamp above and a bright panel behind; the numbers lie in a file of the same name and the ending `.bin`.
+//! The yarns are the tubes of `weave::yarns`, 0.4 mm apart (the gauze's picks 0.8 mm) and enlarged a thousandfold (a
+//! millimetre is a metre), with a camera, a lamp above and a bright panel behind; the numbers lie in a file of the same
+//! name and the ending `.bin`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,14 @@ fn weave(name: &str) -> Option<(Yarns, [usize; 2])> {
         "plain" => (of(&Draft::plain()), [4, 4]),
         "twill" => (of(&Draft::twill(2, 2)), [2, 2]),
         "satin" => (of(&Draft::satin(5, 2)?), [2, 2]),
-        "leno" => (Yarns::leno(gauge, gauge, 0.6), [4, 4]),
+        // A gauze is wide: at the close pitch of the others its turning ends would bend more sharply than they are thick.
+        "leno" => {
+            let [warp, weft] = [0.4, 0.8].map(|pitch| Gauge {
+                diameter: 0.2,
+                pitch,
+            });
+            (Yarns::leno(warp, weft, 0.6), [4, 2])
+        }
         "lace" => (of(&Draft::lace()).gathered(3, 0.4), [2, 2]),
         _ => return None,
     })

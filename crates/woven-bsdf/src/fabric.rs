@@ -21,6 +21,10 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// The factors of the sheet that send light back.
+const REFLECTED: [&str; 3] = ["r_d", "k_r", "sheen"];
+/// The name under which a file gives the yarn's optical depth.
+const TAU: &str = "tau";
 /// What the name of a colour ends in that belongs to the side away from +z.
 const BACK: &str = "_back";
 
@@ -88,7 +92,8 @@ pub struct OpticsTable {
     pub parameters: BTreeMap<String, f64>,
     /// Linear Rec. 709 colours that multiply linear factors. A reflection factor of the sheet may have a second one for
     /// the side away from +z, under its name and `_back`: `r_d_back = [...]`. Transmission has none: light takes the same
-    /// way from both sides.
+    /// way from both sides. In a file, `tau = [...]` is the yarn's optical depth for each channel; see
+    /// [`Fabric::from_toml`].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub colors: BTreeMap<String, [f64; 3]>,
 }
@@ -116,13 +121,42 @@ impl Fabric {
 
     /// Reads the text of a file and checks that its optics are sound.
     ///
+    /// The optical depth of the yarn for each channel, `tau` of `[optics.colors]`, is the paper's e^-τ: what it leaves of
+    /// the light becomes part of the colours of all transmitted factors here, and the provenance keeps τ. The gap has no
+    /// colour, and what is reflected has its own.
+    ///
     /// # Errors
     /// A sentence that names the field.
     pub fn from_toml(text: &str) -> Result<Self, Refused> {
-        let fabric: Fabric =
+        let mut fabric: Fabric =
             toml::from_str(text).map_err(|e| Refused::new(format!("not a fabric file: {e}")))?;
+        if let Some(tau) = fabric.optics.colors.remove(TAU) {
+            fabric.absorb(tau)?;
+        }
         fabric.optics()?;
         Ok(fabric)
+    }
+
+    /// Multiplies the colours of all transmitted factors by e^-τ.
+    fn absorb(&mut self, tau: [f64; 3]) -> Result<(), Refused> {
+        if tau.iter().any(|t| !(0.0..=1e3).contains(t)) {
+            return Err(Refused::new(format!(
+                "the optical depth {TAU} is {tau:?}; each channel must be 0 or more"
+            )));
+        }
+        let model = model::find(&self.optics.model);
+        let linear = model.into_iter().flat_map(|m| m.linear());
+        for p in linear.filter(|p| !REFLECTED.contains(&p.name)) {
+            let color = self.optics.colors.entry(p.name.to_owned());
+            let color = color.or_insert([1.0; 3]);
+            color
+                .iter_mut()
+                .zip(tau)
+                .for_each(|(c, t)| *c *= (-t).exp());
+        }
+        self.provenance
+            .insert(TAU.to_owned(), format!("{tau:?}, part of the colours"));
+        Ok(())
     }
 
     /// The text of the file.
@@ -159,7 +193,7 @@ impl Fabric {
             ))
         })?;
         let color_of = |key: &String| match key.strip_suffix(BACK) {
-            Some(name) if ["r_d", "k_r", "sheen"].contains(&name) => name.to_owned(),
+            Some(name) if REFLECTED.contains(&name) => name.to_owned(),
             _ => key.clone(),
         };
         let colored = table.colors.keys().map(color_of);

@@ -122,8 +122,9 @@ impl Model for Sheet {
     const EQUATION: &'static str = "T: c_l c_v t_d/(π c̄) + k_t [c0 (M(l,v') + (1-E_l)(1-E_v)/(π(1-Ē))) + (c_l-c0)(c_v-c0)/(π(c̄-c0))]; \
         R: c_l c_v r_d/(π c̄) + min(c_l,c_v) (k_r M_r(l,v) F(f0) + sheen S(l,v)); c = 1 - openness, c0 at normal incidence, c̄ mean; gap: openness·δ";
     const DOC: &'static str = "The woven sheet: openness of the weave as a delta apart, forward GGX lobe along the yarns with its masking \
-        loss given back, diffuse transmission, diffuse and glossy reflection, the sheen of standing fibres. Energy-bounded and \
-        reciprocal by construction.";
+        loss given back, diffuse transmission, diffuse and glossy reflection, the sheen of standing fibres. Reciprocal by construction; \
+        gap + R + T is at most 1 while the factors sum to at most 1. Not for pictures in which single yarns are seen (take the yarns \
+        as geometry), nor for a lobe that is not along warp and weft (take the measured table).";
     const RECIPROCAL: bool = true;
     const PARAMS: &'static [Param] = &[
         Param::linear(
@@ -160,7 +161,7 @@ impl Model for Sheet {
         ),
         Param::shape(
             "gamma_weft",
-            "weft yarn diameter over pitch",
+            "weft yarn diameter over pitch, as gamma_warp; the openness along the normal is (1 - gamma_warp)(1 - gamma_weft)",
             0.0,
             1.0,
             0.75,
@@ -174,7 +175,7 @@ impl Model for Sheet {
         ),
         Param::shape(
             "alpha_x",
-            "width of the forward lobe along the weft",
+            "width of the forward lobe along the weft: 0.05 falls to half its peak 3.7° from straight through, 0.1 at 7.5°, 0.3 at 25°",
             0.02,
             1.0,
             0.2,
@@ -182,7 +183,7 @@ impl Model for Sheet {
         .log(),
         Param::shape(
             "alpha_y",
-            "width of the forward lobe along the warp",
+            "width of the forward lobe along the warp, as alpha_x",
             0.02,
             1.0,
             0.2,
@@ -190,7 +191,7 @@ impl Model for Sheet {
         .log(),
         Param::shape(
             "ralpha_x",
-            "width of the reflection lobe along the weft",
+            "width of the reflection lobe along the weft: 0.1 falls to half its peak 7.5° from the mirrored direction, 0.3 at 25°",
             0.02,
             1.0,
             0.4,
@@ -198,7 +199,7 @@ impl Model for Sheet {
         .log(),
         Param::shape(
             "ralpha_y",
-            "width of the reflection lobe along the warp",
+            "width of the reflection lobe along the warp, as ralpha_x",
             0.02,
             1.0,
             0.4,
@@ -206,7 +207,7 @@ impl Model for Sheet {
         .log(),
         Param::shape(
             "f0",
-            "reflectance of the yarn's surface at normal incidence",
+            "reflectance of the yarn's surface at normal incidence: 0.04 for a refractive index of 1.5",
             0.0,
             1.0,
             0.04,

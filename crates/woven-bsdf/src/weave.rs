@@ -30,10 +30,12 @@ pub fn openness<R: Real>(gamma_warp: R, gamma_weft: R, section: R, w: Vec3<R>) -
 
 /// The yarn's share averaged over the cosine-weighted hemisphere: (1/π) ∫ (1 - openness) cosθ dω.
 ///
-/// Eight Gauss points in cosθ on each of three panels, narrower towards grazing where a sparse weave closes, times ten
-/// azimuths of one quadrant: within 6e-4 of the converged value, relative, also with the kinks of cut-off angles.
+/// Eight Gauss points in cosθ on each of four panels, narrower towards grazing where sparse or flat yarns close, times ten
+/// azimuths of one quadrant: within 6e-4 of the converged value, relative, also with the kinks of cut-off angles. What a
+/// tilt adds to the cover, the mean less the cover along the normal, is right to 7e-4 of a beam even for tapes, of which it is
+/// a thousandth: the sheet divides by it. (With three panels from 0.15 on it was wrong by 5e-3 for a section of 0.02.)
 pub fn mean_cover<R: Real>(gamma_warp: R, gamma_weft: R, section: R) -> R {
-    const PANELS: [(f64, f64); 3] = [(0.0, 0.15), (0.15, 0.45), (0.45, 1.0)];
+    const PANELS: [(f64, f64); 4] = [(0.0, 0.02), (0.02, 0.1), (0.1, 0.35), (0.35, 1.0)];
     const AZIMUTHS: usize = 10;
     let mut sum = R::zero();
     for (lo, hi) in PANELS {

@@ -1,9 +1,11 @@
 //! What the cloth cannot enter: floor, wall, sill, and itself.
 
 mod cells;
+mod creases;
 mod distance;
 mod folds;
 mod guard;
+mod motions;
 mod net;
 mod obstacles;
 mod patches;

@@ -7,9 +7,11 @@
 //!   per cell the twist: E = B_t A |x_ij mixed difference / (hx hy)|², B_t = sqrt(B_warp B_weft).
 
 mod friction;
+mod heat;
 mod slab;
 
 pub(crate) use friction::{Friction, RISE};
+pub(crate) use heat::HeatSet;
 pub(crate) use slab::{Slab, Terms};
 
 use crate::sheet::{Field, Sheet, half_at_ends};

@@ -46,6 +46,6 @@ pub use reference::{Reference, explicit_step};
 pub use sheet::{Energy, Sheet};
 pub use simulation::{Frame, Report, Simulation, TICKS};
 pub use spec::{CurtainSpec, SecondLayer};
-pub use step::{Stepper, stable_step};
+pub use step::{Stepper, gust_step, stable_step};
 pub use weave::weave_strain;
 pub use wind::{AIR_DENSITY, Opening, Wind, WindSpec, uniform_wind_forces, von_karman};

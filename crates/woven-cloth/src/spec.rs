@@ -37,6 +37,8 @@ pub struct CurtainSpec {
     pub heading: Heading,
     /// How uneven the folds become towards the hem, 0 to 1.
     pub irregularity: f64,
+    /// Share of the pleats' curvature that is set by heat, 0 to 1: how far the cloth is at ease in its folds.
+    pub heat_set: f64,
     /// Vertices along the weft.
     pub columns: usize,
     /// Vertices along the warp.
@@ -90,6 +92,7 @@ impl Default for CurtainSpec {
             pleats: 12,
             heading: Heading::Wave,
             irregularity: 0.3,
+            heat_set: 0.0,
             columns: 121,
             rows: 81,
             fabric: None,

@@ -15,17 +15,17 @@
 //! not depend on the count of threads, so neither do the bits.
 
 mod columns;
+mod length;
 mod rows;
 
+pub use length::{gust_step, stable_step};
+
 use crate::contact::{Obstacles, SelfContact};
-use crate::force::{Friction, RISE, Shape};
+use crate::force::{Friction, HeatSet, Shape};
 use crate::line::{Block, LANES, Lane};
 use crate::sheet::{Field, Sheet};
 use crate::work::{over_bands, widest, worth_threads};
 use rayon::prelude::*;
-
-/// How far a step may go: the largest h'²ω² of shear, bending and tension waves.
-const STABLE: f64 = 0.75;
 
 /// The state of the production solver beside the sheet itself.
 #[derive(Clone, Debug)]
@@ -35,6 +35,8 @@ pub struct Stepper {
     shape: Shape,
     /// Friction between yarns, for a fabric that has it.
     pub(crate) friction: Option<Friction>,
+    /// Folds that are set by heat.
+    pub(crate) heat_set: Option<HeatSet>,
     /// Retardation times of shear and of bending, s.
     tau: [f64; 2],
     /// Positions and velocities one step back.
@@ -66,19 +68,6 @@ pub struct Stepper {
     weft_w: Vec<Vec<Lane>>,
 }
 
-/// The longest stable step, s, for a sheet: shear, bending and the waves of a tension of three times its weight.
-#[must_use]
-pub fn stable_step(sheet: &Sheet, gravity: f64) -> f64 {
-    let height = sheet.hy * (sheet.ny - 1) as f64;
-    let tension = 4.0 * 3.0 * gravity * height / sheet.hx.min(sheet.hy).powi(2);
-    let more = |limit: f64| if limit > 0.0 { 1.0 + RISE } else { 1.0 };
-    let m = &sheet.mechanics;
-    let omega2 = more(m.shear_hysteresis) * Shape::shear_omega2(sheet)
-        + more(m.bending_hysteresis) * Shape::bending_omega2(sheet)
-        + tension;
-    1.5 * (STABLE / omega2).sqrt()
-}
-
 fn zeros(n: usize) -> Field {
     [vec![0.0; n], vec![0.0; n], vec![0.0; n]]
 }
@@ -96,6 +85,7 @@ impl Stepper {
             gravity,
             shape: Shape::new(sheet),
             friction: Friction::new(sheet),
+            heat_set: None,
             tau: [
                 tau.min(limit(Shape::shear_omega2(sheet))),
                 tau.min(limit(Shape::bending_omega2(sheet))),
@@ -201,6 +191,10 @@ impl Stepper {
             self.begin(sheet);
             self.dt
         };
+        if let Some(folds) = &mut self.heat_set {
+            let third = if self.history { 1.0 / 3.0 } else { 0.0 };
+            folds.update(sheet, &self.x_old, third, self.hp);
+        }
         if let Some(friction) = &mut self.friction {
             let third = if self.history { 1.0 / 3.0 } else { 0.0 };
             friction.update(sheet, [&self.x_old, &self.v_old], third, self.hp);

@@ -21,7 +21,7 @@ use woven_fit::measurement::Measurement;
 #[command(
     name = "woven-fit",
     version,
-    after_help = "Example: woven-fit fit assets/measurements/klems_aniso_high.xml --out fit/"
+    after_help = "Example: woven-fit fit assets/measurements/mecho_6216_goniometer.xml --out fit/"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -61,7 +61,7 @@ enum Command {
         json: bool,
     },
     /// What a measurement says by itself: transmittance per incidence, openness, peak, skirt and floor.
-    #[command(after_help = "Example: woven-fit info assets/measurements/klems_aniso_high.xml")]
+    #[command(after_help = "Example: woven-fit info assets/measurements/mecho_6216_goniometer.xml")]
     Info {
         /// The measurement.
         data: PathBuf,
@@ -69,8 +69,10 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Convert a measurement between formats, by the files' endings.
-    #[command(after_help = "Example: woven-fit convert shade.xml shade.csv")]
+    /// Convert a measurement to scattered points (.csv) or PAB text (.pab, a file for each incidence).
+    #[command(
+        after_help = "Examples: woven-fit convert shade.xml shade.csv\n          woven-fit convert scan.csv scan.pab"
+    )]
     Convert {
         /// What to read.
         input: PathBuf,
@@ -96,7 +98,7 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
                 info.to_text()
             })
         }
-        Command::Convert { input, output } => convert(&input, &output),
+        Command::Convert { input, output } => print(&convert(&input, &output)?),
     }
 }
 

@@ -6,6 +6,7 @@ use std::io::Write;
 use std::path::Path;
 use woven_bsdf::measured::csv::{Direct, Sample, Scan};
 use woven_bsdf::measured::klems::{Kind, Klems};
+use woven_bsdf::measured::pab::Pab;
 
 /// Writes a file whole or not at all: into a temporary file in the same folder, then renamed.
 ///
@@ -38,26 +39,70 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
-/// Reads one format and writes another, by the endings of the file names.
+/// Reads one format and writes another, by the endings of the file names; says what was written.
 ///
 /// # Errors
 /// A sentence when the way is not known or a file cannot be read or written.
-pub fn convert(input: &Path, output: &Path) -> Result<()> {
+pub fn convert(input: &Path, output: &Path) -> Result<String> {
     let data = Measurement::read(input)?;
     let end = output
         .extension()
         .map(|e| e.to_string_lossy().to_lowercase())
         .unwrap_or_default();
-    let scan = match (&data.source, end.as_str()) {
-        (Source::Scan(scan), "csv") => scan.clone(),
-        (Source::Klems(k), "csv") => scan_of(k, &data)?,
-        (Source::Klems(_) | Source::Scan(_), _) => bail!(
-            "cannot write {}: from {} only .csv can be made",
+    if !["csv", "pab"].contains(&end.as_str()) {
+        bail!(
+            "cannot write {}: from {} only .csv and .pab can be made",
             output.display(),
             input.display()
+        );
+    }
+    let scan = match &data.source {
+        Source::Scan(scan) => scan.clone(),
+        Source::Klems(k) => scan_of(k, &data)?,
+    };
+    if end == "pab" {
+        return write_pab(output, &data.name, &scan);
+    }
+    write_atomically(output, scan.to_text().as_bytes())?;
+    Ok(format!(
+        "written: {}, {} values and {} straight-through rows\n",
+        output.display(),
+        scan.samples.len(),
+        scan.direct.len()
+    ))
+}
+
+/// A file for each incidence: `output` itself where there is one, else with a number behind its name.
+fn write_pab(output: &Path, name: &str, scan: &Scan) -> Result<String> {
+    let files = Pab::from_scan(name, scan);
+    let numbered = |i: usize| {
+        let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+        output.with_file_name(format!("{stem}_{:03}.pab", i + 1))
+    };
+    let path = |i: usize| match files.len() {
+        1 => output.to_owned(),
+        _ => numbered(i),
+    };
+    for (i, file) in files.iter().enumerate() {
+        write_atomically(&path(i), file.to_text().as_bytes())?;
+    }
+    let mut said = match files.len() {
+        0 => bail!("there are no values to write"),
+        1 => format!("written: {}\n", path(0).display()),
+        n => format!(
+            "written: {} to {}, one incidence each\n",
+            path(0).display(),
+            path(n - 1).display()
         ),
     };
-    write_atomically(output, scan.to_text().as_bytes())
+    let errors = scan.samples.iter().filter(|s| s.sigma.is_some()).count();
+    if scan.direct.len() + errors > 0 {
+        said += &format!(
+            "left out, as PAB has no place for them: {} straight-through rows, {errors} standard errors\n",
+            scan.direct.len()
+        );
+    }
+    Ok(said)
 }
 
 /// The fitted band of a matrix file as scattered points at the patches' centres; the straight-through patches become

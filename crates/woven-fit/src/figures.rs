@@ -1,17 +1,19 @@
 //! The figures of a fit: slices through the measurement with the models on top, polar plots, residuals.
 //!
-//! All return SVG text, so that a report or a catalog page can put them in line. Model curves are the kernel-averaged
-//! values that were compared with the data, joined by lines, not the bare formula.
+//! Pages put them in line as SVG text; [`all`] gives them as drawings, which can become pixels too. Model curves are the
+//! kernel-averaged values that were compared with the data, joined by lines, not the bare formula.
 
 use crate::fit::{FitResult, ModelFit};
 use crate::measurement::{Point, Points};
-use crate::plot::{COLORS, Mark, Scale, Series, chart, polar};
+use crate::plot::{BLACK, COLORS, Color, Drawing, Mark, Scale, Series, chart, polar};
 use std::f64::consts::PI;
 use woven_bsdf::angles::degrees;
 use woven_bsdf::vec3::Vec3;
 
 /// Points this near to a plane (sine of the azimuth difference) belong to its slice.
 const PLANE: f64 = 0.07;
+/// Fewest directions of a plane that make a plot.
+const FEWEST: usize = 5;
 
 /// One measured plane of outgoing directions: rows of the points with their signed angle.
 #[derive(Clone, Debug)]
@@ -74,7 +76,7 @@ pub fn slices(points: &Points) -> Vec<Slice> {
                 continue;
             }
             let s = slice(points, best, phi);
-            if s.rows.len() >= 5
+            if s.rows.len() >= FEWEST
                 && !out
                     .iter()
                     .any(|o: &Slice| o.incidence == best && (o.phi_deg - s.phi_deg).abs() < 1.0)
@@ -93,7 +95,7 @@ pub fn slices(points: &Points) -> Vec<Slice> {
 
 fn series(
     name: &str,
-    color: &'static str,
+    color: Color,
     mark: Mark,
     slice: &Slice,
     value: &dyn Fn(usize) -> f64,
@@ -110,14 +112,18 @@ fn series(
     }
 }
 
-/// Data and models over the outgoing angle of one slice.
+/// Data and models over the outgoing angle of one slice, as SVG text.
 pub fn slice_chart(points: &Points, slice: &Slice, models: &[&ModelFit], scale: Scale) -> String {
+    slice_drawing(points, slice, models, scale).to_string()
+}
+
+fn slice_drawing(points: &Points, slice: &Slice, models: &[&ModelFit], scale: Scale) -> Drawing {
     let mut list: Vec<Series> = models
         .iter()
         .zip(COLORS)
         .map(|(m, color)| series(&m.label, color, Mark::Line, slice, &|i| m.fitted[i]))
         .collect();
-    list.push(series("measured", "#111", Mark::Dots, slice, &|i| {
+    list.push(series("measured", BLACK, Mark::Dots, slice, &|i| {
         points.points[i].f
     }));
     let title = format!(
@@ -130,7 +136,7 @@ pub fn slice_chart(points: &Points, slice: &Slice, models: &[&ModelFit], scale: 
 }
 
 /// Misfit over value, in per cent, of one slice.
-pub fn residual_chart(points: &Points, slice: &Slice, models: &[&ModelFit]) -> String {
+pub fn residual_chart(points: &Points, slice: &Slice, models: &[&ModelFit]) -> Drawing {
     let ratio = |m: &ModelFit, i: usize| {
         100.0 * (m.fitted[i] / points.points[i].f.max(1e-12) - 1.0).clamp(-2.0, 5.0)
     };
@@ -147,26 +153,14 @@ pub fn residual_chart(points: &Points, slice: &Slice, models: &[&ModelFit]) -> S
 }
 
 /// Every figure of the report with a name for its file.
-pub fn all(result: &FitResult) -> Vec<(String, String)> {
+pub fn all(result: &FitResult) -> Vec<(String, Drawing)> {
     let points = &result.transmission_points;
     let models = shown(result);
-    let mut out = Vec::new();
-    let planes = [(0.0, "weft"), (PI / 2.0, "warp")];
-    for theta in [0.0, 40.0] {
-        if theta > 0.0 && points.incidences.len() == 1 {
-            continue;
-        }
-        for (phi, plane) in planes {
-            out.push((
-                format!("polar-{theta:.0}-{plane}"),
-                polar_plot(result, theta, phi),
-            ));
-        }
-    }
+    let mut out = polar_plots(result);
     for slice in slices(points) {
         let name = format!("{:.0}-{:.0}", slice.theta_deg, slice.phi_deg);
-        let linear = slice_chart(points, &slice, &models, Scale::Linear);
-        let log = slice_chart(points, &slice, &models, Scale::Log);
+        let linear = slice_drawing(points, &slice, &models, Scale::Linear);
+        let log = slice_drawing(points, &slice, &models, Scale::Log);
         out.push((format!("slice-{name}"), linear));
         out.push((format!("slice-{name}-log"), log));
         out.push((
@@ -174,22 +168,41 @@ pub fn all(result: &FitResult) -> Vec<(String, String)> {
             residual_chart(points, &slice, &models),
         ));
     }
-    let sheet = |f: &&ModelFit| f.has_gap && f.label == "sheet";
-    if let Some(fit) = result.ranking.iter().find(sheet) {
-        out.push(("gap".to_owned(), gap_chart(points, fit)));
+    if let Some(fit) = result.sheet().filter(|f| f.has_gap) {
+        out.push(("gap".to_owned(), gap_drawing(points, fit)));
+    }
+    out
+}
+
+/// Polar plots at the normal and at 40° in both planes, with names for their files; those of planes that were measured.
+pub fn polar_plots(result: &FitResult) -> Vec<(String, Drawing)> {
+    let points = &result.transmission_points;
+    let mut out = Vec::new();
+    for theta in [0.0, 40.0] {
+        if theta > 0.0 && points.incidences.len() == 1 {
+            continue;
+        }
+        for (phi, plane) in [(0.0, "weft"), (PI / 2.0, "warp")] {
+            let measured = nearest(points, theta, phi)
+                .is_some_and(|i| slice(points, i, phi).rows.len() >= FEWEST);
+            if measured {
+                let drawing = polar_drawing(result, theta, phi);
+                out.push((format!("polar-{theta:.0}-{plane}"), drawing));
+            }
+        }
     }
     out
 }
 
 /// Measured and fitted scattering of one incidence in one plane, transmitted below and reflected above the sheet.
 ///
-/// `theta_deg` picks the nearest incidence in the weft plane (`phi` = 0) or another plane of azimuth `phi` radians.
+/// `theta_deg` picks the nearest incidence in the weft plane (`phi` = 0) or another plane of azimuth `phi` radians. SVG text.
 pub fn polar_plot(result: &FitResult, theta_deg: f64, phi: f64) -> String {
-    let sheet = result
-        .ranking
-        .iter()
-        .find(|f| f.label == "sheet")
-        .or(result.ranking.first());
+    polar_drawing(result, theta_deg, phi).to_string()
+}
+
+fn polar_drawing(result: &FitResult, theta_deg: f64, phi: f64) -> Drawing {
+    let sheet = result.sheet().or(result.ranking.first());
     let mut data = Vec::new();
     let mut model = Vec::new();
     let mut found_deg = 0.0;
@@ -240,7 +253,7 @@ pub fn polar_plot(result: &FitResult, theta_deg: f64, phi: f64) -> String {
         .collect();
     list.push(Series {
         name: "measured".into(),
-        color: "#111",
+        color: BLACK,
         mark: Mark::Dots,
         points: data,
     });
@@ -259,11 +272,7 @@ fn nearest(points: &Points, theta_deg: f64, phi: f64) -> Option<usize> {
 
 /// The models that the figures show: the best one, the sheet, and the best of other families, at most four.
 pub fn shown(result: &FitResult) -> Vec<&ModelFit> {
-    let mut out: Vec<&ModelFit> = result
-        .ranking
-        .iter()
-        .filter(|f| f.label == "sheet")
-        .collect();
+    let mut out: Vec<&ModelFit> = result.sheet().into_iter().collect();
     for fit in &result.ranking {
         if out.len() < 4 && !out.iter().any(|o| o.model == fit.model) {
             out.push(fit);
@@ -272,8 +281,12 @@ pub fn shown(result: &FitResult) -> Vec<&ModelFit> {
     out
 }
 
-/// Straight-through transmittance over the angle of incidence, measured and fitted.
+/// Straight-through transmittance over the angle of incidence, measured and fitted, as SVG text.
 pub fn gap_chart(points: &Points, fit: &ModelFit) -> String {
+    gap_drawing(points, fit).to_string()
+}
+
+fn gap_drawing(points: &Points, fit: &ModelFit) -> Drawing {
     let rows: Vec<(usize, &Point)> = points
         .points
         .iter()
@@ -299,7 +312,7 @@ pub fn gap_chart(points: &Points, fit: &ModelFit) -> String {
         },
         Series {
             name: "measured".into(),
-            color: "#111",
+            color: BLACK,
             mark: Mark::Dots,
             points: of(&|_, p| p.f),
         },

@@ -134,7 +134,7 @@ pub(crate) fn finish(
     for _ in 0..rounds {
         let mut problem = Separable::new(eval, linearised(full, &weights, options.metric, floor));
         let s = solve(&mut problem, &x, &quick);
-        weights = reweight(&problem.k, &s.x);
+        weights = reweight(&problem.factors_at(&s.x), &s.x);
         x = s.x;
     }
     let last = if options.metric == Metric::Linear {
@@ -148,8 +148,9 @@ pub(crate) fn finish(
         return None;
     }
     // Factors and shape together: the other metrics need it, and the covariance always.
-    let n = problem.k.len();
-    let mut both: Vec<f64> = problem.k.iter().chain(&s.x).copied().collect();
+    let mut both = problem.factors_at(&s.x);
+    let n = both.len();
+    both.extend(&s.x);
     let (mut outcome, mut evaluations) = (s.outcome, s.evaluations);
     let mut joint = Joint::new(eval, weights, options.metric, floor);
     if options.metric != Metric::Linear {
@@ -267,8 +268,7 @@ pub(crate) fn cross_validation(
     if full.incidences.len() < 5 {
         return None;
     }
-    let (_, gap) = spec.shape_at(&best.x);
-    let (shape, _) = spec.shape_at(&best.x);
+    let (shape, gap) = spec.shape_at(&best.x);
     let own = spec.model.params.iter().any(|p| p.name == "gamma_warp");
     let gap = if own {
         [shape[0], shape[1], shape[2]]

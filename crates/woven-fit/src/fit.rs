@@ -75,8 +75,8 @@ pub struct Parameter {
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// Its standard error; none where the data cannot see it or only limit it. Where the covariance misleads, half of the
-    /// 68 % interval of the profile.
+    /// Its standard error; none where the data cannot see it or only limit it. Where the covariance misleads, the least
+    /// number of which one, two and three hold the profile's intervals on either side.
     pub standard_error: Option<f64>,
     /// 68.27 % interval, like the next.
     pub interval68: Option<(f64, f64)>,

@@ -60,6 +60,8 @@ pub struct Info {
     pub blocks: Vec<BlockInfo>,
     /// Straight-through rows of a scan: (theta_deg, phi_deg, transmittance).
     pub direct: Vec<(f64, f64, f64)>,
+    /// What is odd about the rows of a scan.
+    pub notes: Vec<String>,
 }
 
 impl Parts {
@@ -116,6 +118,7 @@ pub fn info(data: &Measurement) -> Info {
         band: data.band().map(str::to_owned),
         blocks: Vec::new(),
         direct: Vec::new(),
+        notes: data.remarks(),
     };
     match &data.source {
         Source::Klems(k) => {
@@ -218,6 +221,9 @@ impl Info {
         }
         for (theta, phi, t) in &self.direct {
             writeln!(s, "direct: theta {theta:.1}, phi {phi:.1}: {t:.5}").expect(ok);
+        }
+        for note in &self.notes {
+            writeln!(s, "note: {note}").expect(ok);
         }
         s
     }

@@ -22,11 +22,11 @@
 //! ```
 //!
 //! From a file it is [`fit::fit_measurement`]; [`fit::FitResult::fabric`] gives the fabric file, [`report::html`] the
-//! report, [`figures`] its plots as SVG text, [`compare`] one table of many files. Any other least-squares problem goes to
+//! report, [`figures`] its plots as SVG text, [`pixels`] those as PNG, [`compare`] one table of many files. Any other least-squares problem goes to
 //! [`solve::solve`], its error bars to [`uncertainty`] and, where those mislead, to [`profile`]. Without a goniometer
 //! [`photos`] gives first values.
 //!
-//! What is absent: no formula of optics (they are woven-bsdf's), no derivative by hand, no picture written but SVG.
+//! What is absent: no formula of optics (they are woven-bsdf's), no derivative by hand, no drawing library but what turns its SVG into PNG.
 
 pub mod compare;
 pub mod convert;
@@ -40,6 +40,7 @@ pub mod info;
 pub mod linalg;
 pub mod measurement;
 pub mod photos;
+pub mod pixels;
 pub mod plot;
 pub mod problem;
 pub mod profile;

@@ -1,15 +1,26 @@
-//! Plots as SVG text: curves over an angle, polar plots, matrices. No fonts, scripts or files beside them.
+//! Plots: curves over an angle, polar plots, matrices; as SVG text or as pixels.
 
+mod drawing;
 mod matrix;
 
+pub(crate) use drawing::{Anchor, BLACK, DOT_OPACITY, FONT_SIZE, Shape, Text};
+pub use drawing::{Color, Drawing, escape};
 pub use matrix::correlations;
 
-use std::fmt::Write;
+use drawing::{AXIS, FAINT, GRID};
 
-/// Colours that people with any colour vision tell apart (Okabe and Ito 2008).
-pub const COLORS: [&str; 7] = [
-    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f",
+/// Colours that people with any colour vision tell apart (Okabe and Ito 2008), and a grey.
+pub const COLORS: [Color; 7] = [
+    [0x00, 0x72, 0xb2],
+    [0xd5, 0x5e, 0x00],
+    [0x00, 0x9e, 0x73],
+    [0xcc, 0x79, 0xa7],
+    [0xe6, 0x9f, 0x00],
+    [0x56, 0xb4, 0xe9],
+    [0x7f, 0x7f, 0x7f],
 ];
+/// Of the arriving light.
+const LIGHT: Color = [0xe6, 0xa0, 0x00];
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,8 +36,8 @@ pub enum Mark {
 pub struct Series {
     /// Name in the legend; empty for none.
     pub name: String,
-    /// CSS colour.
-    pub color: &'static str,
+    /// Its colour.
+    pub color: Color,
     /// Dots or line.
     pub mark: Mark,
     /// (x, y).
@@ -40,16 +51,6 @@ pub enum Scale {
     Linear,
     /// Decades; values ≤ 0 are left out.
     Log,
-}
-
-const OK: &str = "a string grows";
-
-/// Text made safe inside SVG and HTML.
-pub fn escape(s: &str) -> String {
-    s.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 /// Ticks at 1, 2 or 5 times a power of ten, about `count` of them.
@@ -78,7 +79,7 @@ fn label(x: f64) -> String {
 }
 
 /// A chart of several series, 460 × 300 units, with axes, grid and legend.
-pub fn chart(title: &str, x_name: &str, y_name: &str, series: &[Series], scale: Scale) -> String {
+pub fn chart(title: &str, x_name: &str, y_name: &str, series: &[Series], scale: Scale) -> Drawing {
     let (w, h, left, right, top, bottom) = (460.0, 300.0, 58.0, 10.0, 28.0, 42.0);
     let visible = |y: f64| y.is_finite() && (scale == Scale::Linear || y > 0.0);
     let all: Vec<(f64, f64)> = series
@@ -86,10 +87,9 @@ pub fn chart(title: &str, x_name: &str, y_name: &str, series: &[Series], scale: 
         .flat_map(|s| s.points.iter().copied())
         .filter(|p| visible(p.1))
         .collect();
-    let mut svg = open(w, h, title);
+    let mut drawing = Drawing::new(w, h, title);
     if all.is_empty() {
-        svg += "</svg>";
-        return svg;
+        return drawing;
     }
     let fold = |f: fn(f64, f64) -> f64, start: f64, get: fn(&(f64, f64)) -> f64| {
         all.iter().map(get).fold(start, f)
@@ -121,8 +121,9 @@ pub fn chart(title: &str, x_name: &str, y_name: &str, series: &[Series], scale: 
     let up = |v: f64| if scale == Scale::Log { v.log10() } else { v };
     let y = |v: f64| h - bottom - ((up(v) - y0) / (y1 - y0)).clamp(0.0, 1.0) * (h - top - bottom);
     for t in ticks(x0, x1, 7.0) {
-        let px = x(t);
-        write!(svg, "<path d='M{px:.1} {top}V{:.1}' class='g'/><text x='{px:.1}' y='{:.1}' class='m'>{}</text>", h - bottom, h - bottom + 14.0, label(t)).expect(OK);
+        let (px, foot) = (x(t), h - bottom);
+        drawing.line(vec![(px, top), (px, foot)], GRID, 1.0);
+        drawing.text((px, foot + 14.0), Anchor::Middle, AXIS, &label(t));
     }
     let y_ticks: Vec<f64> = if scale == Scale::Log {
         (y0 as i32..=y1 as i32).map(|e| 10f64.powi(e)).collect()
@@ -131,81 +132,49 @@ pub fn chart(title: &str, x_name: &str, y_name: &str, series: &[Series], scale: 
     };
     for t in y_ticks {
         let py = y(t);
-        write!(svg, "<path d='M{left} {py:.1}H{:.1}' class='g'/><text x='{:.1}' y='{:.1}' class='e'>{}</text>", w - right, left - 5.0, py + 3.5, label(t)).expect(OK);
+        drawing.line(vec![(left, py), (w - right, py)], GRID, 1.0);
+        drawing.text((left - 5.0, py + 3.5), Anchor::End, AXIS, &label(t));
     }
-    write!(
-        svg,
-        "<text x='{:.1}' y='{:.1}' class='m'>{}</text><text transform='translate(12 {:.1}) rotate(-90)' class='m'>{}</text>",
-        (left + w - right) / 2.0,
-        h - 8.0,
-        escape(x_name),
-        (top + h - bottom) / 2.0,
-        escape(y_name)
-    )
-    .expect(OK);
+    let (across, up) = ((left + w - right) / 2.0, (top + h - bottom) / 2.0);
+    drawing.text((across, h - 8.0), Anchor::Middle, AXIS, x_name);
+    drawing.turned((12.0, up), -90.0, Anchor::Middle, AXIS, y_name);
     for s in series {
-        let points: Vec<(f64, f64)> = s
-            .points
-            .iter()
-            .filter(|p| visible(p.1))
-            .map(|p| (x(p.0), y(p.1)))
-            .collect();
-        draw(&mut svg, s, &points);
+        let points = s.points.iter().filter(|p| visible(p.1));
+        draw(&mut drawing, s, points.map(|p| (x(p.0), y(p.1))).collect());
     }
-    legend(&mut svg, series, w - right - 6.0, top + 12.0);
-    svg += "</svg>";
-    svg
+    // The legend stands on the side where the curves are lower.
+    let third = (x1 - x0) / 3.0;
+    let highest = |from: f64, to: f64| {
+        let inside = all.iter().filter(|p| (from..=to).contains(&p.0));
+        inside.map(|p| p.1).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let end = if highest(x1 - third, x1) > highest(x0, x0 + third) {
+        let longest = series.iter().map(|s| s.name.chars().count()).max();
+        left + 24.0 + 6.0 * longest.unwrap_or(0) as f64
+    } else {
+        w - right - 6.0
+    };
+    legend(&mut drawing, series, end, top + 12.0);
+    drawing
 }
 
-fn open(w: f64, h: f64, title: &str) -> String {
-    format!(
-        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {w} {h}' width='{w}' height='{h}' font-family='system-ui,sans-serif' font-size='11'>\
-         <style>.g{{stroke:#ddd;fill:none}}.m{{text-anchor:middle;fill:#444}}.e{{text-anchor:end;fill:#444}}.t{{font-weight:600;fill:#111}}</style>\
-         <rect width='{w}' height='{h}' fill='#fff'/><text x='8' y='17' class='t'>{}</text>",
-        escape(title)
-    )
-}
-
-fn draw(svg: &mut String, s: &Series, points: &[(f64, f64)]) {
+fn draw(drawing: &mut Drawing, s: &Series, points: Vec<(f64, f64)>) {
     match s.mark {
-        Mark::Dots => {
-            for (x, y) in points {
-                write!(
-                    svg,
-                    "<circle cx='{x:.1}' cy='{y:.1}' r='2.6' fill='{}' fill-opacity='.85'/>",
-                    s.color
-                )
-                .expect(OK);
-            }
-        }
-        Mark::Line if !points.is_empty() => {
-            svg.push_str("<path d='M");
-            for (i, (x, y)) in points.iter().enumerate() {
-                write!(svg, "{}{x:.1} {y:.1}", if i > 0 { "L" } else { "" }).expect(OK);
-            }
-            write!(
-                svg,
-                "' fill='none' stroke='{}' stroke-width='1.6'/>",
-                s.color
-            )
-            .expect(OK);
-        }
-        Mark::Line => {}
+        Mark::Dots => points.iter().for_each(|&at| drawing.dot(at, 2.6, s.color)),
+        Mark::Line => drawing.line(points, s.color, 1.6),
     }
 }
 
-fn legend(svg: &mut String, series: &[Series], right: f64, top: f64) {
+/// Names with their marks, one below the other, ending at `right`.
+fn legend(drawing: &mut Drawing, series: &[Series], right: f64, top: f64) {
     for (i, s) in series.iter().filter(|s| !s.name.is_empty()).enumerate() {
         let y = top + 14.0 * i as f64;
-        write!(
-            svg,
-            "<text x='{:.1}' y='{y:.1}' class='e' style='fill:{}'>{} {}</text>",
-            right,
-            s.color,
-            escape(&s.name),
-            if s.mark == Mark::Dots { "●" } else { "—" }
-        )
-        .expect(OK);
+        drawing.text((right - 14.0, y), Anchor::End, s.color, &s.name);
+        let (from, to) = ((right - 10.0, y - 3.5), (right, y - 3.5));
+        match s.mark {
+            Mark::Dots => drawing.dot((0.5 * (from.0 + to.0), from.1), 2.6, s.color),
+            Mark::Line => drawing.line(vec![from, to], s.color, 1.6),
+        }
     }
 }
 
@@ -214,9 +183,9 @@ fn legend(svg: &mut String, series: &[Series], right: f64, top: f64) {
 ///
 /// Points are (angle, f): the angle in radians is measured from the downward normal (straight through) for transmission,
 /// |angle| < π/2, and beyond that goes on up to the reflected half; f in 1/sr.
-pub fn polar(title: &str, series: &[Series], light_angle: f64) -> String {
+pub fn polar(title: &str, series: &[Series], light_angle: f64) -> Drawing {
     let (w, h, cx, cy, radius) = (420.0, 400.0, 210.0, 210.0, 168.0);
-    let mut svg = open(w, h, title);
+    let mut drawing = Drawing::new(w, h, title);
     let values = || {
         series
             .iter()
@@ -233,48 +202,43 @@ pub fn polar(title: &str, series: &[Series], light_angle: f64) -> String {
     let place = |angle: f64, f: f64| (cx + r(f) * angle.sin(), cy + r(f) * angle.cos());
     let mut decade = low;
     while decade <= top {
-        let rr = r(10f64.powf(decade));
-        if rr > 0.0 {
-            write!(svg, "<circle cx='{cx}' cy='{cy}' r='{rr:.1}' class='g'/><text x='{:.1}' y='{:.1}' fill='#888'>{}</text>", cx + 3.0, cy - rr + 11.0, label(10f64.powf(decade))).expect(OK);
+        let radius = r(10f64.powf(decade));
+        if radius > 0.0 {
+            drawing.shapes.push(Shape::Ring {
+                at: (cx, cy),
+                radius,
+                color: GRID,
+            });
+            let name = label(10f64.powf(decade));
+            drawing.text((cx + 3.0, cy - radius + 11.0), Anchor::Start, FAINT, &name);
         }
         decade += 1.0;
     }
     for k in 0..12 {
         let a = f64::from(k) * std::f64::consts::PI / 6.0;
-        write!(
-            svg,
-            "<path d='M{cx} {cy}L{:.1} {:.1}' class='g'/>",
-            cx + radius * a.sin(),
-            cy + radius * a.cos()
-        )
-        .expect(OK);
+        let rim = (cx + radius * a.sin(), cy + radius * a.cos());
+        drawing.line(vec![(cx, cy), rim], GRID, 1.0);
     }
-    write!(
-        svg,
-        "<path d='M{} {cy}H{}' stroke='#333' stroke-width='2'/>",
-        cx - radius,
-        cx + radius
-    )
-    .expect(OK);
+    drawing.line(vec![(cx - radius, cy), (cx + radius, cy)], [0x33; 3], 2.0);
     let (ax, ay) = (
         cx - radius * light_angle.sin(),
         cy - radius * light_angle.cos(),
     );
-    write!(
-        svg,
-        "<path d='M{ax:.1} {ay:.1}L{:.1} {:.1}' stroke='#e6a000' stroke-width='2.5'/><circle cx='{ax:.1}' cy='{ay:.1}' r='5' fill='#e6a000'/>",
-        cx + (ax - cx) * 0.06,
-        cy + (ay - cy) * 0.06
-    )
-    .expect(OK);
+    let tip = (cx + (ax - cx) * 0.06, cy + (ay - cy) * 0.06);
+    drawing.line(vec![(ax, ay), tip], LIGHT, 2.5);
+    drawing.dot((ax, ay), 5.0, LIGHT);
     for s in series {
         let inside = s.points.iter().filter(|p| p.1 > 0.0 && p.1.is_finite());
-        let points: Vec<(f64, f64)> = inside.map(|p| place(p.0, p.1)).collect();
-        draw(&mut svg, s, &points);
+        draw(&mut drawing, s, inside.map(|p| place(p.0, p.1)).collect());
     }
-    legend(&mut svg, series, w - 8.0, 17.0);
-    write!(svg, "<text x='8' y='{:.1}' fill='#888'>radius: log f, 1/sr; above: reflected, below: transmitted</text></svg>", h - 8.0).expect(OK);
-    svg
+    legend(&mut drawing, series, w - 8.0, 17.0);
+    drawing.text(
+        (8.0, h - 8.0),
+        Anchor::Start,
+        FAINT,
+        "radius: log f, 1/sr; above: reflected, below: transmitted",
+    );
+    drawing
 }
 
 #[cfg(test)]
@@ -289,18 +253,17 @@ mod tests {
             mark: Mark::Dots,
             points: vec![(0.0, 1.0), (0.5, 0.1), (1.0, f64::NAN)],
         };
-        for svg in [
-            chart("t", "x", "y", std::slice::from_ref(&s), Scale::Log),
-            chart("t", "x", "y", std::slice::from_ref(&s), Scale::Linear),
-        ] {
+        for scale in [Scale::Log, Scale::Linear] {
+            let svg = chart("t", "x", "y", std::slice::from_ref(&s), scale).to_string();
             assert_eq!(
                 svg.matches("<circle").count(),
-                2,
-                "the NaN is left out, the others are there"
+                3,
+                "the NaN is left out, the others and the legend's are there"
             );
             assert!(svg.contains("a &lt; b") && !svg.contains("NaN") && svg.ends_with("</svg>"));
         }
-        assert!(!polar("p", &[s], 0.3).contains("NaN"));
-        assert!(correlations(&["a", "b"], &[Some(1.0), None, None, Some(1.0)]).contains("1.00"));
+        assert!(!polar("p", &[s], 0.3).to_string().contains("NaN"));
+        let matrix = correlations(&["a", "b"], &[Some(1.0), None, None, Some(1.0)]);
+        assert!(matrix.to_string().contains("1.00"));
     }
 }

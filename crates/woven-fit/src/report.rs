@@ -1,22 +1,26 @@
 //! What a fit leaves behind: the fabric file and the report as one HTML page that opens offline.
 
-use crate::figures::{gap_chart, polar_plot, residual_chart, shown, slice_chart, slices};
+use crate::figures::{gap_chart, polar_plots, residual_chart, shown, slice_chart, slices};
 use crate::fit::{FitResult, ModelFit};
 use crate::plot::{Scale, correlations, escape};
 use crate::rank::place_or_tie;
 use crate::text;
 use std::collections::BTreeMap;
-use std::f64::consts::PI;
 use std::fmt::Write;
 use woven_bsdf::fabric::{Fabric, OpticsTable};
 use woven_bsdf::model;
 
 impl FitResult {
+    /// The fit of the sheet to the transmission; none if it was not asked for.
+    pub fn sheet(&self) -> Option<&ModelFit> {
+        self.ranking.iter().find(|f| f.label == "sheet")
+    }
+
     /// The sheet as a fabric file, with hashes of what it was made from; none if no sheet was fitted.
     ///
     /// `command` goes into its provenance.
     pub fn fabric(&self, command: &str) -> Option<Fabric> {
-        let fit = self.ranking.iter().find(|f| f.label == "sheet")?;
+        let fit = self.sheet()?;
         let info = model::find(fit.model)?;
         let reflection = self.reflection.as_ref();
         // The reflection was fitted on top of the transmission's values, so its list holds all of them.
@@ -128,22 +132,11 @@ pub fn html(result: &FitResult, command: &str) -> String {
     writeln!(s, "<h2>Measurement and models</h2><p>Curves are the models averaged over the instrument's patches, as they were compared.</p>").expect(ok);
     let models = shown(result);
     let points = &result.transmission_points;
-    writeln!(
-        s,
-        "<div class='row'>{}{}</div>",
-        polar_plot(result, 0.0, 0.0),
-        polar_plot(result, 0.0, PI / 2.0)
-    )
-    .expect(ok);
-    if points.incidences.len() > 1 {
-        writeln!(
-            s,
-            "<div class='row'>{}{}</div>",
-            polar_plot(result, 40.0, 0.0),
-            polar_plot(result, 40.0, PI / 2.0)
-        )
-        .expect(ok);
+    s += "<div class='row'>";
+    for (_, plot) in polar_plots(result) {
+        s += &plot.to_string();
     }
+    s += "</div>\n";
     let slices = slices(points);
     for slice in &slices {
         writeln!(
@@ -156,13 +149,9 @@ pub fn html(result: &FitResult, command: &str) -> String {
     }
     writeln!(s, "<h2>Residuals</h2><div class='row'>").expect(ok);
     for slice in slices.iter().take(4) {
-        s += &residual_chart(points, slice, &models);
+        s += &residual_chart(points, slice, &models).to_string();
     }
-    if let Some(fit) = result
-        .ranking
-        .iter()
-        .find(|f| f.has_gap && f.label == "sheet")
-    {
+    if let Some(fit) = result.sheet().filter(|f| f.has_gap) {
         s += &gap_chart(points, fit);
     }
     s += "</div>";
@@ -175,7 +164,7 @@ pub fn html(result: &FitResult, command: &str) -> String {
     writeln!(
         s,
         "<h2>How to read this</h2><p>Fits minimise the sum of squares in the {} metric by Levenberg–Marquardt with exact derivatives, linear factors separated and not negative, \
-         from evenly spread starts (seed {}). Where a gap is fitted, straight-through patches and the rest have their own scatter. Error bars are standard errors from the covariance at the minimum, or, where that misleads, from the profile of the sum of squares; they hold the \
+         from evenly spread starts (seed {}). Where a gap is fitted, straight-through patches and the rest have their own scatter. Error bars are standard errors from the covariance at the minimum, or, where that misleads, from the profile of the sum of squares: then so wide that one, two and three of them hold its intervals of 68, 95 and 99.7 %. They hold the \
          model to be true and the points' errors to be independent, so between files of one cloth expect more. SSE and RMS are of values divided by the peak, times 10⁴. \
          A place is shared where AICc differs by less than 2 or a bootstrap over incidences does not settle the order.</p></html>",
         result.metric.name(),

@@ -57,7 +57,7 @@ pub(crate) fn summary(
                 remark: String::new(),
             };
             match (best.ranges[j], u.standard_error[j]) {
-                (Some(range), _) => profiled(&mut p, &range, log),
+                (Some(range), _) => profiled(&mut p, &range, &quantiles, log),
                 (None, Some(se)) => normal(&mut p, se, &quantiles, log),
                 (None, None) if !best.at_bound[j] => {
                     p.remark = "the data cannot see it alone".to_owned();
@@ -139,7 +139,7 @@ fn normal(p: &mut Parameter, se: f64, quantiles: &[f64; 3], log: bool) {
 }
 
 /// Intervals from the profile; none, and no error bar, where the profile ends on neither side.
-fn profiled(p: &mut Parameter, range: &Range, log: bool) {
+fn profiled(p: &mut Parameter, range: &Range, quantiles: &[f64; 3], log: bool) {
     let natural = |x: f64| if log { x.exp() } else { x };
     let value = |end: End| match end {
         End::Crossed(x) | End::Bound(x) => natural(x),
@@ -160,7 +160,15 @@ fn profiled(p: &mut Parameter, range: &Range, log: bool) {
         (false, false) => "the data cannot see it alone".to_owned(),
     };
     let (lo, hi) = range.ends[0];
-    if crossed(lo) && crossed(hi) && p.interval95.is_some() {
-        p.standard_error = Some(0.5 * (value(hi) - value(lo)));
+    if crossed(lo) && crossed(hi) {
+        // One number for what has two sides: so large that one, two and three of it reach to the ends of all intervals.
+        let reach = |(i, t): (Option<(f64, f64)>, &f64)| {
+            i.map_or(f64::INFINITY, |(lo, hi)| {
+                (hi - p.value).max(p.value - lo) / t
+            })
+        };
+        let intervals = [p.interval68, p.interval95, p.interval997];
+        let reaches = intervals.into_iter().zip(quantiles).map(reach);
+        p.standard_error = Some(reaches.fold(0.0, f64::max)).filter(|s| s.is_finite());
     }
 }

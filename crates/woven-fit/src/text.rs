@@ -96,7 +96,9 @@ pub fn parameters(fit: &ModelFit) -> String {
     );
     let ok = "a string grows";
     for p in &fit.parameters {
-        let profile = p.interval95.filter(|_| p.profiled);
+        // A limit tells the interval already.
+        let limit = p.remark.contains("95 %");
+        let profile = p.interval95.filter(|_| p.profiled && !limit);
         let interval = profile.map_or(String::new(), |(lo, hi)| {
             format!(" (95 %: {} … {}, by profile)", number(lo), number(hi))
         });

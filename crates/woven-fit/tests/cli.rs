@@ -148,8 +148,13 @@ fn pab_text_is_read_like_the_scan_it_came_from() {
     let scan = woven_fit::synth::scan_of(ward, &[0.2, 0.3, 0.2, 0.35], &[20.0], 0.0, 0);
     let pab = woven_bsdf::measured::pab::Pab::from_scan("ward", &scan);
     assert_eq!(pab.len(), 1, "one incidence, one file");
-    let path = dir.path().join("ward.pab");
-    std::fs::write(&path, pab[0].to_text()).unwrap();
+    let (csv, path) = (dir.path().join("ward.csv"), dir.path().join("ward.pab"));
+    std::fs::write(&csv, scan.to_text()).unwrap();
+    let output = run(&["convert", csv.to_str().unwrap(), path.to_str().unwrap()]);
+    assert!(output.status.success(), "{output:?}");
+    let lines = |text: &str| text.lines().count();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(lines(&text), lines(&pab[0].to_text()));
     let data = woven_fit::measurement::Measurement::read(&path).unwrap();
     let points = data.points(true, woven_fit::measurement::Detail::Full, false);
     assert_eq!(points.points.len(), scan.samples.len());
@@ -191,6 +196,7 @@ fn convert_to_csv_and_fit_that() {
         "lambert",
         "--plane",
         "normal",
+        "--plots",
         "--out",
         out.to_str().unwrap(),
     ]);
@@ -213,6 +219,21 @@ fn convert_to_csv_and_fit_that() {
             .unwrap()
             .contains("</html>")
     );
+    // Every figure in both forms, each with the command in its head.
+    let mut figures = 0;
+    for entry in std::fs::read_dir(&out).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "svg") {
+            figures += 1;
+            let svg = std::fs::read_to_string(&path).unwrap();
+            assert!(svg.starts_with("<!-- woven-fit fit") && svg.ends_with("</svg>"));
+            let png = std::fs::read(path.with_extension("png")).unwrap();
+            assert!(png.starts_with(b"\x89PNG"), "{}", path.display());
+            let head = b"woven-fit fit";
+            assert!(png.windows(head.len()).any(|w| w == head));
+        }
+    }
+    assert!(figures >= 5, "{figures}");
 }
 
 #[test]
@@ -295,10 +316,12 @@ fn odd_rows_are_named_in_the_notes() {
     let last = text.lines().last().unwrap().to_owned();
     text += &format!("{last}\n0,0,90,0,0.1,\n");
     std::fs::write(&path, text).unwrap();
-    let output = run(&["fit", path.to_str().unwrap(), "--model", "lambert"]);
-    let text = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        text.contains("row 159 repeats row 158") && text.contains("row 160 left out"),
-        "{text}"
-    );
+    let path = path.to_str().unwrap();
+    for args in [vec!["fit", path, "--model", "lambert"], vec!["info", path]] {
+        let text = String::from_utf8(run(&args).stdout).unwrap();
+        assert!(
+            text.contains("row 159 repeats row 158") && text.contains("row 160 left out"),
+            "{text}"
+        );
+    }
 }

@@ -87,6 +87,18 @@ fn coverage(spec: &Spec, truth: &[f64], make: impl Fn(u64) -> Scan + Sync) -> Ve
     truth.iter().enumerate().map(one).collect()
 }
 
+/// The coverage with the lines and without them; with them it holds for every parameter.
+fn compared<S: Fn(u64) -> Scan + Sync>(
+    spec: &Spec,
+    truth: &[f64],
+    make: impl Fn(bool) -> S,
+) -> [Vec<(f64, f64)>; 2] {
+    let [with, without] = [true, false].map(|named| coverage(spec, truth, make(named)));
+    println!("with    {with:?}\nwithout {without:?}");
+    assert!(with.iter().all(|(share, _)| *share >= LEAST), "{with:?}");
+    [with, without]
+}
+
 fn lobe() -> Spec {
     Spec::transmission(model::find("ggx-mirrored").unwrap(), true, false)
 }
@@ -103,12 +115,7 @@ fn a_shared_scale_and_floor_widen_what_they_move() {
             scan
         }
     };
-    let (with, without) = (
-        coverage(&lobe(), &TRUTH, make(true)),
-        coverage(&lobe(), &TRUTH, make(false)),
-    );
-    println!("{with:?}\n{without:?}");
-    assert!(with.iter().all(|(share, _)| *share >= LEAST), "{with:?}");
+    let [with, without] = compared(&lobe(), &TRUTH, make);
     // Factors are known as well as the scale, not better; widths do not care.
     assert!(without[0].0 < 0.5 && without[1].0 < 0.5, "{without:?}");
     assert!(
@@ -133,12 +140,7 @@ fn axes_that_are_off_are_found_and_do_not_mislead() {
             scan
         }
     };
-    let (with, without) = (
-        coverage(&lobe(), &TRUTH, make(true)),
-        coverage(&lobe(), &TRUTH, make(false)),
-    );
-    println!("{with:?}\n{without:?}");
-    assert!(with.iter().all(|(share, _)| *share >= LEAST), "{with:?}");
+    let [with, without] = compared(&lobe(), &TRUTH, make);
     assert!(without.iter().any(|(share, _)| *share < 0.8), "{without:?}");
     // Knowing what is off makes the error bars of the lobe shorter, not longer.
     assert!(with[2].1 < 0.8 * without[2].1, "{with:?} {without:?}");
@@ -174,12 +176,7 @@ fn rows_count_by_what_is_their_own() {
             scan
         }
     };
-    let (told, untold) = (
-        coverage(&lobe(), &TRUTH, make(true)),
-        coverage(&lobe(), &TRUTH, make(false)),
-    );
-    println!("{told:?}\n{untold:?}");
-    assert!(told.iter().all(|(share, _)| *share >= LEAST), "{told:?}");
+    let [told, untold] = compared(&lobe(), &TRUTH, make);
     assert!(told[2].1 < 0.8 * untold[2].1, "{told:?} {untold:?}");
 }
 
@@ -214,12 +211,7 @@ fn the_gap_knows_of_a_shared_scale() {
         }
     };
     let truth: Vec<f64> = TRUTH.into_iter().chain(GAP).collect();
-    let (with, without) = (
-        coverage(&spec, &truth, make(true)),
-        coverage(&spec, &truth, make(false)),
-    );
-    println!("{with:?}\n{without:?}");
-    assert!(with.iter().all(|(share, _)| *share >= LEAST), "{with:?}");
+    let [_, without] = compared(&spec, &truth, make);
     assert!(without[4].0 < 0.5 && without[5].0 < 0.5, "{without:?}");
 }
 

@@ -6,6 +6,7 @@ use known::{coverage, entangled_truth, fit, found_by_aicc, points, spec, table2,
 use rayon::prelude::*;
 use woven_fit::fit::{ModelFit, Options, Profiles};
 use woven_fit::identify::printed;
+use woven_fit::problem::Spec;
 use woven_fit::rank;
 use woven_fit::robust::Loss;
 use woven_fit::synth::SETS;
@@ -54,6 +55,27 @@ fn the_sets_give_their_known_orders_in_100_of_100_seeds() {
         let ordered = ordered.count();
         println!("{}: expected order in {ordered} of 100", set.name);
         assert_eq!(ordered, 100, "{}", set.name);
+    }
+}
+
+#[test]
+fn a_lobe_with_two_widths_fits_no_worse_than_with_one() {
+    // One plane sees k_t/alpha_y only: with the factor projected out nothing depends on alpha_y.
+    let sheet = woven_bsdf::model::find("sheet").expect("in the list");
+    let two = Spec::transmission(sheet, true, false);
+    let one = two.isotropic().expect("it has two widths");
+    for (set, seed) in SETS.iter().flat_map(|s| (0..4).map(move |i| (s, i))) {
+        let points = points(set.scan(Some(seed)));
+        let [two, one] = [&two, &one].map(|s| fit(s, &points, &scores()));
+        assert_ne!(two.outcome, "stuck at a kink", "{} {seed}", set.name);
+        assert!(
+            two.sse_e4 < 1.001 * one.sse_e4 && two.uncertainty.rank == 3,
+            "{} {seed}: {} for {}, rank {}",
+            set.name,
+            two.sse_e4,
+            one.sse_e4,
+            two.uncertainty.rank
+        );
     }
 }
 
@@ -118,6 +140,7 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
         for c in coverage(truth, 0, sets) {
             println!("{} {c:?}", truth.spec.label);
             let [c68, c95, c997] = c.shares;
+            assert!(c.three_sigma > 0.96, "{} {c:?}", truth.name);
             if c.identifiable() {
                 assert!((0.54..0.83).contains(&c68), "{} {c:?}", truth.name);
                 assert!((0.884..=1.0).contains(&c95), "{} {c:?}", truth.name);

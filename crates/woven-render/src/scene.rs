@@ -5,6 +5,7 @@
 //! per channel unless a field says otherwise.
 
 pub mod environment;
+pub mod fabric;
 pub mod gltf;
 pub mod sky;
 

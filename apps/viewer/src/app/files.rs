@@ -104,6 +104,10 @@ impl Viewer {
             use std::io::Write;
             Ok(out.write_all(text.as_bytes())?)
         });
+        // The map first would leave a picture that nobody names, if the fabric could not be written.
+        let pattern = self.cloth.pattern.as_ref();
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        let written = written.and_then(|()| pattern.map_or(Ok(()), |map| map.copy_to(folder)));
         match written {
             Ok(()) => self.tell(format!("The fabric is saved as {}.", path.display()), false),
             Err(told) => self.tell(format!("{told:#}"), true),

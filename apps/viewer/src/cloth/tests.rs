@@ -65,3 +65,54 @@ fn a_yarn_never_gives_more_than_it_gets() {
     assert!((sum - 1.0).abs() < 1e-12);
     assert!(Fabric::from_toml(&cloth.fabric("full").to_toml()).is_ok());
 }
+
+/// A lace with a map, and another colour behind.
+const MAPPED: &str = "name = \"lace\"\n[weave]\nwarp_diameter_mm = 0.2\nwarp_pitch_mm = 0.4\nweft_diameter_mm = 0.2\n\
+    weft_pitch_mm = 0.4\nopenness_map = \"holes.png\"\n[optics]\nmodel = \"sheet\"\nparameters = { t_d = 0.3, r_d = 0.5 }\n\
+    [optics.colors]\nr_d_back = [0.2, 0.4, 1.2]\n";
+
+fn opened(folder: &Path) -> Cloth {
+    std::fs::write(folder.join("lace.toml"), MAPPED).expect("the folder is ours");
+    woven_render::film::write_png8(&folder.join("holes.png"), 2, 1, &[0, 0, 0, 255, 255, 255])
+        .expect("it is written");
+    Cloth::open(&folder.join("lace.toml")).expect("it is sound")
+}
+
+#[test]
+fn a_map_and_a_back_are_shown_and_saved() {
+    let folder = tempfile::tempdir().expect("there is room");
+    let mut cloth = opened(folder.path());
+    let woven = cloth.woven();
+    let back = woven.back.expect("the file has another colour behind");
+    assert_eq!((woven.linear[2], back[2]), ([0.5; 3], [0.1, 0.2, 0.6]));
+    assert_eq!(back[0], woven.linear[0]);
+
+    let pattern = cloth.pattern.clone().expect("the file names a map");
+    let covered = pattern.cover(woven_render::scene::Material::matt("", [0.0; 3]));
+    assert_eq!(covered.0.coverage_texture.expect("covered").texture, 0);
+    assert_eq!(
+        covered.1.pixels.iter().map(|p| p[3]).collect::<Vec<_>>(),
+        [255, 0]
+    );
+
+    // The back follows the slider, and counts where the yarn would give more than it gets.
+    let at = |name: &str| cloth.model.params.iter().position(|p| p.name == name);
+    let (r_d, gamma) = (at("r_d").unwrap(), at("gamma_warp").unwrap());
+    cloth.values[r_d] = 0.7;
+    assert!((cloth.given() - (0.3 + 0.7 * 1.2)).abs() < 1e-12);
+    cloth.values[r_d] = 0.4;
+    cloth.values[gamma] = 0.8;
+    let saved = cloth.fabric("another");
+    assert_eq!(saved.optics.colors["r_d_back"], [0.2, 0.4, 1.2]);
+    let weave = saved.weave.as_ref().expect("it names the map");
+    assert!((weave.warp_diameter_mm - 0.32).abs() < 1e-12 && weave.openness_map == "holes.png");
+
+    let other = tempfile::tempdir().expect("there is room");
+    pattern.copy_to(other.path()).expect("the folder is empty");
+    std::fs::write(other.path().join("a.toml"), saved.to_toml()).expect("the folder is ours");
+    let again = Cloth::open(&other.path().join("a.toml")).expect("it is complete");
+    assert_eq!(again.woven(), cloth.woven());
+    std::fs::write(other.path().join("holes.png"), "mine").expect("the folder is ours");
+    let told = pattern.copy_to(other.path()).expect_err("it lies there");
+    assert!(told.to_string().contains("another picture"), "{told}");
+}

@@ -7,6 +7,7 @@ use super::klems::{Kind, Klems};
 use crate::fabric::{Fabric, Optics, OpticsTable};
 use crate::model::{MAX_LINEAR, find};
 use crate::sheet::Sheet;
+use crate::sheet::linear::{K_R, K_T, R_D, SHEEN, T_D};
 use crate::term::albedo::GAUSS8;
 use crate::term::{ggx, warp};
 use crate::vec3::Vec3;
@@ -99,15 +100,16 @@ impl Shop {
         }
         even.1 = 1.0 - mean_cover(s[0], s[1], s[2]);
         Ok(std::array::from_fn(|c| {
-            let sum = |b: &[f64; MAX_LINEAR], js: [usize; 2]| {
+            let sum = |b: &[f64; MAX_LINEAR], js: &[usize]| {
                 js.iter().map(|&j| optics.linear[j][c] * b[j]).sum::<f64>()
             };
+            let (through, back) = ([T_D, K_T], [R_D, K_R, SHEEN]);
             Shop {
                 tau_nn: Sheet::gap(s, normal),
-                tau_nd: sum(&at_normal, [0, 1]),
-                tau_dd: even.1 + sum(&even.0, [0, 1]),
-                rho_n: sum(&at_normal, [2, 3]),
-                rho_dd: sum(&even.0, [2, 3]),
+                tau_nd: sum(&at_normal, &through),
+                tau_dd: even.1 + sum(&even.0, &through),
+                rho_n: sum(&at_normal, &back),
+                rho_dd: sum(&even.0, &back),
             }
         }))
     }
@@ -121,10 +123,11 @@ fn scattered(optics: &Optics, l: Vec3<f64>) -> [f64; MAX_LINEAR] {
     let up = Vec3::new(l.x, l.y, l.z.abs());
     let mut out = [0.0; MAX_LINEAR];
     for (j, side, lobe) in [
-        (0, -1.0, None),
-        (1, -1.0, Some((s[3], s[4]))),
-        (2, 1.0, None),
-        (3, 1.0, Some((s[5], s[6]))),
+        (T_D, -1.0, None),
+        (K_T, -1.0, Some((s[3], s[4]))),
+        (R_D, 1.0, None),
+        (K_R, 1.0, Some((s[5], s[6]))),
+        (SHEEN, 1.0, None),
     ] {
         let share = if lobe.is_some() { 0.5 } else { 1.0 };
         let mut add = |w: Vec3<f64>, weight: f64| {
@@ -182,6 +185,7 @@ pub fn fabric_from_card(name: &str, openness: f64, tau: f64, rho: f64) -> Result
         ("r_d", rho / cover),
         ("k_t", 0.0),
         ("k_r", 0.0),
+        ("sheen", 0.0),
     ];
     let known = find("sheet").expect("it is in the list");
     debug_assert!(

@@ -13,19 +13,26 @@ impl Model for Hgf {
     const NAME: &'static str = "hgf";
     const EQUATION: &'static str = "a_d HG(g_d) + a_s HG(g_s) + c/π, HG(g) = (1-g²)/(4π(1+g²-2g cosθ)^1.5), θ between v and -l";
     const DOC: &'static str = "The paper's (3) with the gap taken apart: a_d = ρ e^-τ k_d, a_s = ρ e^-τ k_s, which is all that a \
-        measurement can see. Reciprocal; not bounded in energy (a phase function has no cosine); transmission only.";
+        measurement can see. Reciprocal; not bounded in energy (a phase function has no cosine: at grazing incidence more \
+        may leave than came); transmission only. For comparison with the paper and for fits; do not render with it.";
     const RECIPROCAL: bool = true;
     const PARAMS: &'static [Param] = &[
         Param::linear("a_d", "strength of the broad lobe", 4.0, 0.3),
         Param::shape(
             "g_d",
-            "mean cosine of the broad lobe: 0 even, 1 straight on",
+            "mean cosine of the broad lobe: 0 even, 0.3 falls to half its peak at 59°, 1 straight on",
             0.0,
             0.95,
             0.3,
         ),
         Param::linear("a_s", "strength of the narrow lobe", 4.0, 0.3),
-        Param::shape("g_s", "mean cosine of the narrow lobe", 0.3, hg::G_MAX, 0.9),
+        Param::shape(
+            "g_s",
+            "mean cosine of the narrow lobe: 0.9 falls to half its peak at 4.6°, 0.99 at 0.44°",
+            0.3,
+            hg::G_MAX,
+            0.9,
+        ),
         Param::linear("c", "diffuse floor", 1.0, 0.05),
     ];
 

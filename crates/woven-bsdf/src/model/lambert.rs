@@ -29,7 +29,7 @@ pub(crate) fn sample<R: Real>(wo: Vec3<R>, u1: R, u2: R) -> Vec3<R> {
 /// The parameter k_d that most models carry.
 pub(crate) const K_D: Param = Param::linear(
     "k_d",
-    "diffuse transmittance: the flux spread evenly behind the sheet",
+    "diffuse transmittance: the flux spread evenly behind the sheet; 0.3 is a white curtain, 0.01 a dark shade",
     1.0,
     0.2,
 );
@@ -37,7 +37,8 @@ pub(crate) const K_D: Param = Param::linear(
 impl Model for Lambert {
     const NAME: &'static str = "lambert";
     const EQUATION: &'static str = "k_d/π";
-    const DOC: &'static str = "Lambert 1760. The floor of every fit: what a cloth with no structure would do. Energy: transmits k_d.";
+    const DOC: &'static str = "Lambert 1760. The floor of every fit: what a cloth with no structure would do. Reciprocal; transmits k_d at every \
+        incidence. Not for cloth that one can see through: it has neither a peak nor a gap.";
     const RECIPROCAL: bool = true;
     const PARAMS: &'static [Param] = &[K_D];
 

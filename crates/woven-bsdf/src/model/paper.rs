@@ -15,7 +15,8 @@ impl Model for Paper {
     const EQUATION: &'static str = "k_d/π + k_t [½ W(alpha, n) + ½ M(alpha)]";
     const DOC: &'static str = "Variant P: the paper's (4) with the gap taken apart and k_t = ρ e^-τ k_t of the print. Its L_t part is the \
         refracted lobe W of `ggx-walter`, its L_p part the straight lobe M of `ggx-mirrored`; both have the same alpha, so M is \
-        about six times wider than W at n = 1.5. Not reciprocal, because W is not. It reproduces the paper; do not render with it.";
+        about six times wider than W at n = 1.5. Not reciprocal, because W is not; transmits at most k_d + k_t. It \
+        reproduces the paper; do not render with it.";
     const RECIPROCAL: bool = false;
     const PARAMS: &'static [Param] = &[
         K_D,

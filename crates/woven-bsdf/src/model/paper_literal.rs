@@ -34,8 +34,8 @@ impl Model for PaperLiteral {
     const EQUATION: &'static str = "k_t |l·h||v·h|/(|n·l||n·v|) n² (1-F(θ_nh)) G D(θ_hl) / (l·h + n v·h)² with F without ½, \
         D with tan⁴, G = min(1, 2 n·h n·v/|v·h|, 2 n·h n·l/|v·h|)";
     const DOC: &'static str = "The paper's (5) to (8) typed in as they stand (signs of the denominator as they must be, for else it \
-        is nowhere finite). Passes 7.22 times the light it gets at alpha = 0.1, n = 1.5, normal incidence; negative where F exceeds 1 is cut \
-        to 0. Never use it but to see this; `ggx-walter` and `paper` are the corrected forms.";
+        is nowhere finite). Not reciprocal. Passes 7.22 times the light it gets at alpha = 0.1, n = 1.5, normal incidence; what is \
+        negative, where F exceeds 1, is cut to 0. Never use it but to see this; `ggx-walter` and `paper` are the corrected forms.";
     const RECIPROCAL: bool = false;
     const PARAMS: &'static [Param] = &[
         Param::linear("k_t", "strength of the lobe", 1.0, 0.1),

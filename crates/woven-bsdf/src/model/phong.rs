@@ -23,7 +23,7 @@ impl Model for Phong {
     const EQUATION: &'static str = "k_d/π + k_s (m+2)/(2π) max(0, v·t)^m, t = -l";
     const DOC: &'static str = "Phong 1975 around the straight direction, normalised as Lewis 1994 does for reflection: a light along the \
         normal gives k_s. The lobe does not widen towards grazing angles as cloth's does, and part of it falls behind the sheet \
-        there: transmits less than k_s, never more. Reciprocal. A comparison model; do not render with it.";
+        there: transmits at most k_d + k_s. Reciprocal. A comparison model; do not render with it.";
     const RECIPROCAL: bool = true;
     const PARAMS: &'static [Param] = &[
         K_D,

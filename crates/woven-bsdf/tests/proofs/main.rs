@@ -3,6 +3,7 @@
 mod albedo;
 mod damage;
 mod derivatives;
+mod descriptions;
 mod drafts;
 mod energy;
 mod formats;

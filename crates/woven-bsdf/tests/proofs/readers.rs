@@ -260,3 +260,27 @@ fn a_back_of_its_own_colour() {
         assert!(e.contains(needle), "{e:?} lacks {needle:?}");
     }
 }
+
+#[test]
+fn absorption_of_the_yarn() {
+    let text = |colors: &str| {
+        format!(
+            "name = \"x\"\n[optics]\nmodel = \"sheet\"\nparameters = {{ t_d = 0.3, k_t = 0.2, r_d = 0.4 }}\n[optics.colors]\n{colors}\n"
+        )
+    };
+    let plain = Fabric::from_toml(&text("t_d = [1, 0.5, 1]")).unwrap();
+    let dyed = Fabric::from_toml(&text("t_d = [1, 0.5, 1]\ntau = [0, 0.7, 2]")).unwrap();
+    let (a, b) = (plain.optics().unwrap(), dyed.optics().unwrap());
+    for (c, tau) in [0.0f64, 0.7, 2.0].into_iter().enumerate() {
+        // The paper's e^-τ on both transmitted factors, nothing on what is reflected; the gap has no colour at all.
+        for (j, left) in [(0, (-tau).exp()), (1, (-tau).exp()), (2, 1.0)] {
+            assert!((b.linear[j][c] - a.linear[j][c] * left).abs() < 1e-15);
+        }
+    }
+    assert_eq!(a.shape, b.shape);
+    assert!(dyed.provenance["tau"].contains("0.7"));
+    // Written and read again it is the same cloth, not one that absorbs twice.
+    assert_eq!(Fabric::from_toml(&dyed.to_toml()).unwrap(), dyed);
+    let e = Fabric::from_toml(&text("tau = [0, -1, 0]")).unwrap_err();
+    assert!(e.to_string().contains("optical depth"), "{e}");
+}

@@ -1,9 +1,15 @@
 //! Klems files written and read back; the numbers by which cloth is sold, there and back.
 
+use crate::support::flux;
+use std::f64::consts::FRAC_PI_8;
 use std::path::Path;
+use woven_bsdf::fabric::Fabric;
 use woven_bsdf::measured::klems::{Kind, Klems};
 use woven_bsdf::measured::klems_write::klems_full;
 use woven_bsdf::measured::shop::{Shop, fabric_from_card};
+use woven_bsdf::model::dot;
+use woven_bsdf::sheet::Sheet;
+use woven_bsdf::vec3::Vec3;
 
 const FILES: [&str; 3] = [
     "satine_5500_white_pearl.xml",
@@ -63,6 +69,56 @@ fn numbers_of_the_shipped_cloths() {
         "about 70 % of it goes straight on"
     );
     assert!(Shop::of_klems(&shipped(FILES[2]), "Solar").is_err());
+}
+
+#[test]
+fn a_sheets_card_counts_every_factor() {
+    // Against all of the sheet's value at once, integrated by other means than the card's.
+    let fabric = Fabric::from_toml(
+        "name = \"velvet\"\n[optics]\nmodel = \"sheet\"\nparameters = { t_d = 0.2, k_t = 0.1, r_d = 0.3, k_r = 0.1, sheen = 0.3, \
+         gamma_warp = 0.7, gamma_weft = 0.8, alpha_x = 0.3, alpha_y = 0.2 }\n",
+    )
+    .unwrap();
+    let optics = fabric.optics().unwrap();
+    let k: [f64; 8] = optics.linear.map(|c| c[1]);
+    let total = |l: Vec3<f64>, through: bool| {
+        let f = |v: Vec3<f64>| dot(&k, &(optics.model.f64.basis)(&optics.shape, l, v));
+        flux(&f, l, through, Some((0.3, 0.3)), (300, 96))
+    };
+    let [_, card, _] = Shop::of_sheet(&optics).unwrap();
+    let normal = Vec3::new(0.0, 0.0, 1.0);
+    // Both are midpoints in two dimensions: 64 × 32 for the card.
+    for (got, known) in [
+        (card.tau_nd, total(normal, true)),
+        (card.rho_n, total(normal, false)),
+    ] {
+        assert!((got - known).abs() < 1e-3, "{got} instead of {known}");
+    }
+    // Even light: 24 incidences even in projected solid angle, four azimuths each.
+    let (mut t, mut r) = (0.0, 0.0);
+    for i in 0..96 {
+        let theta = ((f64::from(i / 4) + 0.5) / 24.0).sqrt().asin();
+        let l = Vec3::from_angles(theta, (f64::from(i % 4) + 0.5) * FRAC_PI_8);
+        let one = |through| {
+            flux(
+                &|v| dot(&k, &(optics.model.f64.basis)(&optics.shape, l, v)),
+                l,
+                through,
+                Some((0.3, 0.3)),
+                (100, 32),
+            )
+        };
+        t += (one(true) + Sheet::gap(&optics.shape, l)) / 96.0;
+        r += one(false) / 96.0;
+    }
+    println!(
+        "even light: {t:.4} {r:.4}, card {:.4} {:.4}",
+        card.tau_dd, card.rho_dd
+    );
+    assert!(
+        (card.tau_dd - t).abs() < 3e-3 && (card.rho_dd - r).abs() < 3e-3,
+        "{card:?}, {t} {r}"
+    );
 }
 
 #[test]

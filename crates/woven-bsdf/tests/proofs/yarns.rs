@@ -5,7 +5,7 @@ use woven_bsdf::vec3::Vec3;
 use woven_bsdf::weave::draft::Draft;
 use woven_bsdf::weave::map::OpennessMap;
 use woven_bsdf::weave::openness;
-use woven_bsdf::weave::yarns::{Gauge, Yarns};
+use woven_bsdf::weave::yarns::{Aggregate, Gauge, Yarns};
 
 fn gauge(gamma: f64) -> Gauge {
     // In millimetres: two and a half yarns a millimetre.
@@ -38,8 +38,12 @@ fn along_the_normal_crimp_does_not_matter() {
         for (a, b, section) in [(0.5, 0.7, 1.0), (0.8, 0.6, 0.4)] {
             let yarns = Yarns::new(&draft, gauge(a), gauge(b), section);
             let (got, known) = (yarns.openness(normal, 64), (1.0 - a) * (1.0 - b));
-            // A row of cells of 1/64 pitch along the open half of the other yarn's pitch.
-            assert!((got - known).abs() < 0.008, "{}: {got} {known}", draft.name);
+            // The points of the cells, and the chain of balls that a tube is made of, which lets a little more through.
+            assert!(
+                (got - known).abs() < 0.0015,
+                "{}: {got} {known}",
+                draft.name
+            );
         }
     }
 }
@@ -51,9 +55,9 @@ fn flat_yarns_are_the_aggregated_form() {
     for (theta, phi) in [(0.3, 0.2), (0.8, 1.0), (1.0, 2.5)] {
         let w = Vec3::from_angles(theta, phi);
         let (got, known) = (yarns.openness(w, 64), openness(0.5, 0.6, 0.02, w));
-        assert!((got - known).abs() < 0.008, "{theta}: {got} {known}");
+        assert!((got - known).abs() < 0.0025, "{theta}: {got} {known}");
         // Seen from behind, light takes the same way.
-        assert!((yarns.openness(-w, 64) - got).abs() < 0.004);
+        assert!((yarns.openness(-w, 64) - got).abs() < 0.0015);
     }
 }
 
@@ -91,48 +95,64 @@ fn a_ray_meets_what_the_shadow_says() {
     assert!((rays - shadow).abs() < 0.01, "{rays} {shadow}");
 }
 
+/// Of one geometry: the greatest difference of its openness from that of straight yarns of its own diameters, and from that
+/// of the aggregated sheet, over 0…60°, at directions other than those of the fit; and what was fitted.
+fn differences(yarns: &Yarns, gamma: f64, section: f64) -> (f64, f64, Aggregate) {
+    let best = yarns.aggregate();
+    let (mut straight, mut error) = (0.0f64, best.error);
+    for i in 0..=6 {
+        for j in 0..4 {
+            let w = Vec3::from_angles(
+                f64::from(i) * PI / 18.0,
+                (f64::from(j) + 0.5) * FRAC_PI_4 / 2.0,
+            );
+            let t = yarns.openness(w, 48);
+            let form = openness(best.gamma_warp, best.gamma_weft, best.section, w);
+            straight = straight.max((openness(gamma, gamma, section, w) - t).abs());
+            error = error.max((form - t).abs());
+        }
+    }
+    (straight, error, best)
+}
+
 #[test]
 fn the_aggregated_sheet_passes_what_the_yarns_pass() {
-    println!(
-        "{:<10} {:>6} {:>8}  straight  aggregated (γ warp, γ weft, section)",
-        "weave", "γ", "section"
-    );
-    // Two per cent, and a quarter per cent for the oracle's own cells (1/48 of a pitch).
+    // Two per cent, and a quarter per cent for the count's own points (0.0015) and the search (0.001).
     const BOUND: f64 = 0.0225;
-    for (gamma, section, bound) in [
-        (0.5, 0.5, BOUND),
-        (0.65, 0.5, BOUND),
-        (0.75, 0.5, BOUND),
-        (0.75, 1.0, BOUND),
-        // Wide open and round: at 60° one gap of a pair has closed and the other not, which no product of two gratings does.
-        (0.5, 1.0, 0.055),
-    ] {
+    // γ, section, and between what the differences of plain, twill and leno lie. Below, the three cloths that one sees
+    // through widest of round yarns are pinned outside of two per cent, so that the page cannot say more than there is: at
+    // 60° one gap of a pair has closed and the other not, which no product of two gratings does.
+    let mut cases = vec![
+        (0.6, 0.35, 0.0, 0.015),
+        (0.5, 0.5, 0.0, BOUND),
+        (0.65, 0.5, 0.0, BOUND),
+        (0.75, 0.5, 0.0, BOUND),
+        (0.7, 1.0, 0.0, BOUND),
+        (0.65, 1.0, 0.0, 0.03),
+        (0.6, 1.0, BOUND, 0.04),
+        (0.5, 1.0, BOUND, 0.055),
+    ];
+    if std::env::var("WOVEN_LIMITS").is_ok() {
+        // The whole table of the audit.
+        let gammas = [0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.8, 0.9];
+        let all = |s: f64| gammas.into_iter().map(move |g| (g, s, 0.0, 1.0));
+        cases = [0.35, 0.5, 0.7, 1.0].into_iter().flat_map(all).collect();
+    }
+    println!(
+        "{:<10} {:>6} {:>8} {:>8}  straight  aggregated (γ warp, γ weft, section)",
+        "weave", "γ", "section", "open"
+    );
+    for (gamma, section, least, bound) in cases {
         for (name, yarns) in cloths(gamma, section) {
-            let best = yarns.aggregate();
-            let mut straight = 0.0f64;
-            let mut error = 0.0f64;
-            // Other directions than those of the fit.
-            for i in 0..=6 {
-                for j in 0..4 {
-                    let w = Vec3::from_angles(
-                        f64::from(i) * PI / 18.0,
-                        (f64::from(j) + 0.5) * FRAC_PI_4 / 2.0,
-                    );
-                    let t = yarns.openness(w, 48);
-                    straight = straight.max((openness(gamma, gamma, section, w) - t).abs());
-                    error = error.max(
-                        (openness(best.gamma_warp, best.gamma_weft, best.section, w) - t).abs(),
-                    );
-                }
-            }
+            let (straight, error, best) = differences(&yarns, gamma, section);
+            let open = yarns.openness(Vec3::new(0.0, 0.0, 1.0), 48);
             println!(
-                "{name:<10} {gamma:>6} {section:>8}  {straight:.3}     {error:.3} ({:.2}, {:.2}, {:.2}), {:.3} where fitted",
-                best.gamma_warp, best.gamma_weft, best.section, best.error
+                "{name:<10} {gamma:>6} {section:>8} {open:>8.3}  {straight:.3}     {error:.4} ({:.2}, {:.2}, {:.2})",
+                best.gamma_warp, best.gamma_weft, best.section
             );
             assert!(
-                error <= bound && best.error <= bound,
-                "{name} {gamma} {section}: {error} {}",
-                best.error
+                error <= bound && error >= least,
+                "{name} {gamma} {section}: {error} is not within {least}…{bound}"
             );
         }
     }

@@ -8,10 +8,12 @@
 //! An earlier form also moved vertices out of a hard core after the threads were solved: it stretched threads by 8 % where this leaves
 //! 2 % (64 x 64, gusts of 3 m/s), and edges still crossed.
 
+use super::creases::hold_open;
 use super::guard::{Step, keep_apart};
 use super::net::{Grid, Net};
 use super::patches::Patches;
 use crate::sheet::{Field, Sheet};
+use crate::work::widest;
 
 /// Acceleration that parts what lies closer than the gap, m/s².
 const REPULSION: f64 = 150.0;
@@ -77,6 +79,10 @@ impl SelfContact {
         if self.patches.is_new() {
             self.patches.gather_if_moved(before);
         }
+        widest(
+            #[inline(always)]
+            || hold_open(&self.patches.grids, inv_mass, before, x, hp),
+        );
         let reach = self.patches.cap;
         for at in 0..self.patches.pairs.len() {
             if self.patches.pairs[at].slack >= reach {
@@ -138,6 +144,11 @@ impl SelfContact {
             &patches.tiles[pair.b as usize],
         );
         let reach2 = (patches.cap + self.margin).powi(2);
+        let net = Net {
+            grids: &patches.grids,
+            inv_mass: &[],
+            before,
+        };
         touch.clear();
         mine.for_each_vertex(&patches.grids, |a| {
             let p = [before[0][a], before[1][a], before[2][a]];
@@ -147,7 +158,7 @@ impl SelfContact {
                     before[1][b] - p[1],
                     before[2][b] - p[2],
                 ];
-                if dot(d, d) < reach2 && (pair.a != pair.b || a < b) {
+                if dot(d, d) < reach2 && (pair.a != pair.b || a < b) && net.apart_on_cloth(a, b) {
                     touch.push([a as u32, b as u32]);
                 }
             });

@@ -22,6 +22,10 @@ use std::collections::BTreeMap;
 pub(super) const CLOSE: f64 = 5e-5;
 /// Speed of that push, m/s.
 const PUSH: f64 = 0.1;
+/// Distances are told apart up to so many times the motion of the step: what is farther is looked at again after as many steps.
+const AHEAD: f64 = 24.0;
+/// And up to this at least, m, so that what rests is left alone.
+const FAR: f64 = 40.0 * CLOSE;
 /// Rounds in which things are parted one by one; after them they move as one piece.
 const ROUNDS: usize = 6;
 /// Rounds after which the cloth stays where it was.
@@ -72,14 +76,20 @@ fn look(patches: &mut Patches, before: &Field, x: &Field, parallel: bool) -> Vec
         .collect();
     let one = |pair: &mut Pair| {
         let mut found = Vec::new();
+        let (a, b) = (&tiles[pair.a as usize], &tiles[pair.b as usize]);
+        // Neighbours on the cloth have near things to be told apart in any case.
+        let far = if a.adjoins(b) {
+            cap
+        } else {
+            (AHEAD * pair.motion).max(FAR).min(cap)
+        };
         let look = Look {
             grids,
             before,
             now: x,
-            cap,
+            cap: far,
             near: (pair.motion / 0.89).max(CLOSE),
         };
-        let (a, b) = (&tiles[pair.a as usize], &tiles[pair.b as usize]);
         pair.slack = a.look(b, pair.a == pair.b, &look, &mut found);
         found
     };

@@ -51,6 +51,17 @@ impl Net<'_> {
         &self.grids[later.map_or(0, |n| n + 1)]
     }
 
+    /// Whether two vertices are not corners of one cell.
+    #[inline(always)]
+    pub(crate) fn apart_on_cloth(&self, a: usize, b: usize) -> bool {
+        let g = self.grid(a);
+        if b < g.first || b >= g.first + g.nx * g.ny {
+            return true;
+        }
+        let (a, b) = (a - g.first, b - g.first);
+        (a % g.nx).abs_diff(b % g.nx) > 1 || (a / g.nx).abs_diff(b / g.nx) > 1
+    }
+
     /// Whether two vertices whose squared distance is `d2` belong to different folds: neighbours on the cloth meet only in a sharp crease.
     #[inline(always)]
     pub(crate) fn may_meet(&self, a: usize, b: usize, d2: f64) -> bool {

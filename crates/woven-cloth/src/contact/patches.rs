@@ -1,11 +1,11 @@
 //! Which patches of the cloth are near each other: found anew when they have moved, with a lower bound of every pair's distance.
 
 use super::distance::{Point, dot};
+use super::motions::{self, Motion};
 use super::net::Grid;
 use super::sort_into_cells;
-use super::tiles::{Bounds, Motion, Tile};
+use super::tiles::{Bounds, Tile};
 use crate::sheet::Field;
-use rayon::prelude::*;
 
 /// Two patches and what is known of them.
 #[derive(Clone, Copy, Debug)]
@@ -58,16 +58,7 @@ impl Patches {
 
     /// Takes the motions of a step from `before` to `x`.
     pub(crate) fn take_motions(&mut self, before: &Field, x: &Field, parallel: bool) {
-        let grids = &self.grids;
-        let of = |(motion, tile): (&mut Motion, &Tile)| *motion = tile.motion(grids, before, x);
-        if parallel {
-            let motions = self.motions.par_chunks_mut(64);
-            motions
-                .zip(self.tiles.par_chunks(64))
-                .for_each(|(m, t)| m.iter_mut().zip(t).for_each(of));
-        } else {
-            self.motions.iter_mut().zip(&self.tiles).for_each(of);
-        }
+        motions::take(&self.grids, before, x, &mut self.motions, parallel);
         let motions = &self.motions;
         for pair in &mut self.pairs {
             pair.motion = motions[pair.a as usize].against(&motions[pair.b as usize]);

@@ -5,7 +5,7 @@ use super::net::Grid;
 use crate::sheet::Field;
 
 /// Cells of a patch along either thread.
-const SIDE: usize = 4;
+pub(super) const SIDE: usize = 4;
 
 /// A patch: the vertices of columns `i` and rows `j`, and the edges and triangles that lie right of and below them.
 #[derive(Clone, Debug)]
@@ -13,22 +13,6 @@ pub(crate) struct Tile {
     grid: usize,
     i: std::ops::Range<usize>,
     j: std::ops::Range<usize>,
-}
-
-/// How a patch moves in a step: all its vertices go by `middle`, give or take `radius`, m.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Motion {
-    pub(crate) middle: Point,
-    pub(crate) radius: f64,
-}
-
-impl Motion {
-    /// The most that a point of one patch moves relative to one of another, m.
-    #[inline(always)]
-    pub(crate) fn against(&self, other: &Self) -> f64 {
-        let d = sub(self.middle, other.middle);
-        dot(d, d).sqrt() + self.radius + other.radius
-    }
 }
 
 /// A box along the axes.
@@ -165,6 +149,13 @@ impl Tile {
         }
     }
 
+    /// Whether the two share vertices: the same patch, or neighbours on the cloth.
+    pub(crate) fn adjoins(&self, other: &Self) -> bool {
+        self.grid == other.grid
+            && self.i.start.abs_diff(other.i.start) <= SIDE
+            && self.j.start.abs_diff(other.j.start) <= SIDE
+    }
+
     /// Calls `f` for the vertices that belong to the patch.
     #[inline(always)]
     pub(crate) fn for_each_vertex(&self, grids: &[Grid], mut f: impl FnMut(usize)) {
@@ -179,26 +170,6 @@ impl Tile {
         let mut b = Bounds::EMPTY;
         self.rows(grids, |row| row.for_each(|k| b.add(x, k)));
         b
-    }
-
-    /// The motion from `before` to `now`.
-    #[inline(always)]
-    pub(crate) fn motion(&self, grids: &[Grid], before: &Field, now: &Field) -> Motion {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        self.rows(grids, |row| {
-            for c in 0..3 {
-                let (a, b) = (&before[c][row.clone()], &now[c][row.clone()]);
-                for (a, b) in a.iter().zip(b) {
-                    low[c] = low[c].min(b - a);
-                    high[c] = high[c].max(b - a);
-                }
-            }
-        });
-        let size = sub(high, low);
-        Motion {
-            middle: std::array::from_fn(|c| 0.5 * (low[c] + high[c])),
-            radius: 0.5 * dot(size, size).sqrt(),
-        }
     }
 
     #[inline(always)]
@@ -245,14 +216,19 @@ impl Tile {
     /// The distance at `before` of what does not share a vertex, at most the cap; things that may meet on the way to `now` or are
     /// very near go to `found`.
     pub(crate) fn look(&self, other: &Self, same: bool, look: &Look, found: &mut Vec<Near>) -> f64 {
-        let (mine, m) = self.cells(look.grids, look.before);
-        let (theirs, n) = other.cells(look.grids, look.before);
+        let (mut mine, mut m) = self.cells(look.grids, look.before);
+        let (mut theirs, mut n) = other.cells(look.grids, look.before);
         let mut least = Least {
             look,
             best: look.cap * look.cap,
             reach: look.cap.max(look.near).powi(2),
             found,
         };
+        if !same {
+            let (a, b) = (around(&mine[..m]), around(&theirs[..n]));
+            m = keep_near(&mut mine, m, &b, least.reach);
+            n = keep_near(&mut theirs, n, &a, least.reach);
+        }
         for (p, a) in mine[..m].iter().enumerate() {
             let from = if same { p } else { 0 };
             for b in &theirs[from..n] {
@@ -284,6 +260,31 @@ impl Tile {
     }
 }
 
+/// The box around all of some cells.
+#[inline(always)]
+fn around(cells: &[Cell]) -> Bounds {
+    cells.iter().fold(Bounds::EMPTY, |mut all, cell| {
+        for c in 0..3 {
+            all.low[c] = all.low[c].min(cell.bounds.low[c]);
+            all.high[c] = all.high[c].max(cell.bounds.high[c]);
+        }
+        all
+    })
+}
+
+/// Of the first `n` cells leaves those whose squared distance from `other` is below `reach`, in their order; tells how many.
+#[inline(always)]
+fn keep_near(cells: &mut [Cell], n: usize, other: &Bounds, reach: f64) -> usize {
+    let mut kept = 0;
+    for k in 0..n {
+        if cells[k].bounds.squared_distance(other) < reach {
+            cells[kept] = cells[k];
+            kept += 1;
+        }
+    }
+    kept
+}
+
 /// The search for the least distance.
 struct Least<'a, 'b> {
     look: &'a Look<'a>,
@@ -311,7 +312,8 @@ impl Least<'_, '_> {
     #[inline(always)]
     fn test(&mut self, edges: bool, vertex: [usize; 4]) {
         let x = self.look.before;
-        let p = vertex.map(|k| [x[0][k], x[1][k], x[2][k]]);
+        let at = |k: usize| [x[0][k], x[1][k], x[2][k]];
+        let p = [at(vertex[0]), at(vertex[1]), at(vertex[2]), at(vertex[3])];
         let d2 = closest(edges, &p).squared;
         if d2 < self.best {
             self.best = d2;

@@ -5,9 +5,10 @@ use crate::contact::SelfContact;
 use crate::draw::Draw;
 use crate::error::Result;
 use crate::fabrics::GRAVITY;
+use crate::force::HeatSet;
 use crate::sheet::{Field, Sheet};
 use crate::spec::CurtainSpec;
-use crate::step::{Stepper, stable_step};
+use crate::step::{Stepper, gust_step};
 use crate::wind::{AirState, Drag, Wind, air_forces, sample};
 use crate::work::worth_threads;
 
@@ -46,6 +47,7 @@ impl Layer {
         let mut stepper = Stepper::new(&sheet, 1.0 / TICKS, GRAVITY);
         stepper.obstacles = spec.obstacles.clone();
         stepper.window = spec.window;
+        stepper.heat_set = HeatSet::of_pleats(&sheet, &spec.layout(), spec.heat_set);
         let empty = || std::array::from_fn(|_| vec![0.0; (nx - 1) * (ny - 1)]);
         Ok(Self {
             drag: Drag::new(&sheet.mechanics, spec.wind.tangential, wind.speed()),
@@ -61,7 +63,7 @@ impl Layer {
 
     /// Steps a tick that the fabric and the grid need.
     pub(super) fn needed(&self) -> f64 {
-        (1.0 / (TICKS * stable_step(&self.sheet, GRAVITY)))
+        (1.0 / (TICKS * gust_step(&self.sheet, GRAVITY)) - 1e-9)
             .ceil()
             .max(2.0)
     }
@@ -72,6 +74,7 @@ impl Layer {
         let mut stepper = Stepper::new(&self.sheet, dt, GRAVITY);
         stepper.obstacles = self.stepper.obstacles.clone();
         stepper.window = self.stepper.window;
+        stepper.heat_set.clone_from(&self.stepper.heat_set);
         stepper.self_contact = friction.map(|f| SelfContact::new(&self.sheet, f));
         self.stepper = stepper;
     }

@@ -30,6 +30,7 @@ impl CurtainSpec {
         range("rail_depth", self.rail_depth, -20.0, 20.0, "m")?;
         range("pleats", f64::from(self.pleats), 1.0, 200.0, "")?;
         range("irregularity", self.irregularity, 0.0, 1.0, "")?;
+        range("heat_set", self.heat_set, 0.0, 1.0, "")?;
         range("columns", self.columns as f64, 3.0, 2049.0, "")?;
         range("rows", self.rows as f64, 3.0, 2049.0, "")?;
         range("hem", self.hem, 0.0, 2.0, "kg/m")?;

@@ -95,8 +95,9 @@ impl Rows<'_> {
                 pred[k] = x[k] + (x[k] - xo[k]) * third + hp * vt[k];
             }
             s.f[c][..n].copy_from_slice(&t.air[c][k0..k0 + n]);
-            if let Some(friction) = &t.friction {
-                for (f, more) in s.f[c][..n].iter_mut().zip(&friction.force[c][k0..k0 + n]) {
+            let sliders = t.friction.iter().map(|friction| &friction.force);
+            for force in sliders.chain(t.heat_set.iter().map(|folds| &folds.force)) {
+                for (f, more) in s.f[c][..n].iter_mut().zip(&force[c][k0..k0 + n]) {
                     *f += more;
                 }
             }

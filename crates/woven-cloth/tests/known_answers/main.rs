@@ -4,10 +4,12 @@
 
 mod air;
 mod bend;
+mod cloth;
 mod folds;
 mod hang;
 mod swing;
 
+use cloth::cloth;
 use woven_cloth::*;
 
 /// One line of the table.
@@ -41,22 +43,6 @@ impl Row {
 
     fn holds(&self) -> bool {
         self.error() <= self.tolerance
-    }
-}
-
-/// The suite's cloth: 0.12 kg/m², 2000 N/m, 5e-6 N·m, no damping.
-fn cloth() -> Mechanics {
-    Mechanics {
-        areal_density: 0.12,
-        tensile_warp: 2000.0,
-        tensile_weft: 2000.0,
-        shear: 20.0,
-        bending_warp: 5e-6,
-        bending_weft: 5e-6,
-        stretch_damping: 0.0,
-        bending_damping: 0.0,
-        openness: 0.0,
-        ..Mechanics::default()
     }
 }
 

@@ -7,7 +7,7 @@ use woven_fit::convert::write_atomically;
 use woven_fit::fit::{FitResult, Options, Profiles, fit_measurement, models_named};
 use woven_fit::problem::Metric;
 use woven_fit::robust::Loss;
-use woven_fit::{figures, report, text};
+use woven_fit::{figures, pixels, report, text};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
@@ -22,7 +22,7 @@ pub(super) struct Args {
     /// Folder for fit.json, the fabric and the report; without it nothing is written.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Also write every figure of the report as an SVG file, for a paper.
+    /// Also write every figure of the report as SVG and as PNG of 300 dots per inch, for a paper.
     #[arg(long, requires = "out")]
     plots: bool,
 }
@@ -141,8 +141,8 @@ fn write_results(
     };
     let command = command_line();
     let mut written = Vec::new();
-    let mut write = |name: String, text: String| {
-        write_atomically(&out.join(&name), text.as_bytes())?;
+    let mut write = |name: String, bytes: &[u8]| {
+        write_atomically(&out.join(&name), bytes)?;
         written.push(name);
         anyhow::Ok(())
     };
@@ -150,21 +150,26 @@ fn write_results(
     if let Some(map) = json.as_object_mut() {
         map.insert("command".into(), command.clone().into());
     }
-    write(
-        name("fit.json"),
-        serde_json::to_string_pretty(&json)? + "\n",
-    )?;
+    let json = serde_json::to_string_pretty(&json)? + "\n";
+    write(name("fit.json"), json.as_bytes())?;
     if let Some(fabric) = result.fabric(&command) {
         let text = format!("# {command}\n{}", fabric.to_toml());
-        write(format!("{stem}.toml"), text)?;
+        write(format!("{stem}.toml"), text.as_bytes())?;
     }
-    write(name("report.html"), report::html(result, &command))?;
+    let page = report::html(result, &command);
+    write(name("report.html"), page.as_bytes())?;
     if plots {
-        for (title, svg) in figures::all(result) {
+        for (title, drawing) in figures::all(result) {
             let head = format!("<!-- {} -->\n", command.replace("--", "- -"));
-            write(name(&format!("{title}.svg")), head + &svg)?;
+            let svg = format!("{head}{drawing}");
+            let png = pixels::png(&drawing, &command)?;
+            write(name(&format!("{title}.svg")), svg.as_bytes())?;
+            write(name(&format!("{title}.png")), &png)?;
         }
     }
-    println!("written to {}: {}", out.display(), written.join(", "));
-    Ok(())
+    print(&format!(
+        "written to {}: {}\n",
+        out.display(),
+        written.join(", ")
+    ))
 }

@@ -136,7 +136,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
             (serde_json::to_string_pretty(&json)? + "\n").as_bytes(),
         )?;
         write_atomically(&out.join(&file), (head + &fabric.to_toml()).as_bytes())?;
-        println!("written to {}: photos.json, {file}", out.display());
+        print(&format!(
+            "written to {}: photos.json, {file}\n",
+            out.display()
+        ))?;
     }
     Ok(())
 }

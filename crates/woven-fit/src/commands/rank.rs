@@ -40,7 +40,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
         write_atomically(&out.join("rank.csv"), csv.as_bytes())?;
         let json = serde_json::to_string_pretty(&json)? + "\n";
         write_atomically(&out.join("rank.json"), json.as_bytes())?;
-        println!("written to {}: rank.csv, rank.json", out.display());
+        print(&format!(
+            "written to {}: rank.csv, rank.json\n",
+            out.display()
+        ))?;
     }
     Ok(())
 }

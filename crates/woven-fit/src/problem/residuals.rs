@@ -52,6 +52,14 @@ impl<'a> Separable<'a> {
             table: Table::default(),
         }
     }
+
+    /// Best factors at `x`, which must be a place that can be evaluated. A solver's last evaluation may have been a step that
+    /// it refused, so `k` is not asked after it.
+    pub fn factors_at(&mut self, x: &[f64]) -> Vec<f64> {
+        let mut r = vec![0.0; self.rows()];
+        self.evaluate(x, &mut r, None);
+        self.k.clone()
+    }
 }
 
 impl Residuals for Separable<'_> {

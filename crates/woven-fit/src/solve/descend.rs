@@ -112,13 +112,16 @@ impl State {
         }
     }
 
-    /// Whether the residual stands at right angles on all free columns, or a full step would be rounding.
+    /// Whether the residual stands at right angles on all free columns that are more than rounding, or a full step would be
+    /// rounding.
     pub(super) fn is_flat(&self) -> bool {
         let free = self.free();
         let cosine = |&j: &usize| {
             let column = &self.rr[j * self.n..=j * self.n + j];
             let length = norm(column) * self.fnorm;
-            length == 0.0 || dot(column, &self.z[..=j]).abs() <= 1e-5 * length
+            // Doubling the parameter would not show in the residual: what the slope of such a column says is rounding.
+            let unseen = length * self.x[j].abs() <= 1e-9 * self.fnorm * self.fnorm;
+            length == 0.0 || unseen || dot(column, &self.z[..=j]).abs() <= 1e-5 * length
         };
         let short = || {
             let step = self.triangle_of(&free, &self.z).solve();

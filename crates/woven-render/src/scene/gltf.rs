@@ -13,9 +13,9 @@ mod uri;
 
 pub use container::{Limits, read_file};
 pub use images::decode_picture;
-pub use material::dress;
 pub use uri::{Source, resolve};
 
+use super::fabric::dress;
 use super::{Camera, LAYER_LAMPS, LAYER_SUN, Light, Material, Mesh, Portal, Scene};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use glam::{Mat3, Mat4, Vec2, Vec3};
@@ -234,13 +234,13 @@ fn assemble(checked: Checked, base: &Path, options: &Options) -> Result<Loaded> 
             let Source::File(found) = found else {
                 bail!("the fabric of material '{}' must be a file", material.name)
             };
-            material::dress(material, &found, &mut pictures.textures)?;
+            dress(material, &found, &mut pictures.textures)?;
         }
     }
     for (name, file) in &options.fabrics {
         let mut hit = false;
         for material in materials.iter_mut().filter(|m| m.name == *name) {
-            material::dress(material, file, &mut pictures.textures)?;
+            dress(material, file, &mut pictures.textures)?;
             hit = true;
         }
         let names = || {

@@ -16,18 +16,13 @@
 //! * the gloss of what is no metal stays white where a texture colours the rest.
 
 use super::images::Pictures;
-use crate::scene::{LAYER_LAMPS, MAX_LINEAR, Material, Texture, TextureUse};
-use anyhow::{Context, Result, ensure};
+use crate::scene::{LAYER_LAMPS, MAX_LINEAR, Material, TextureUse};
+use anyhow::Result;
 use gltf::material::AlphaMode;
 use gltf::texture::Info;
 use serde_json::Value;
-use std::path::Path;
-use woven_bsdf::fabric::Fabric;
-use woven_bsdf::measured::klems::Klems;
-use woven_bsdf::measured::table::Tabulated;
 use woven_bsdf::model::Model;
 use woven_bsdf::sheet::{Sheet, linear, shape};
-use woven_bsdf::weave::map::OpennessMap;
 
 /// Under this roughness a transmitting surface is a clear pane.
 const CLEAR: f32 = 0.1;
@@ -269,98 +264,6 @@ fn sheet_shape(coverage: f32, alpha: f32, f0: f32) -> [f32; crate::scene::MAX_SH
     s[shape::F0] = f64::from(f0.clamp(0.0, 1.0));
     Sheet::derive(&mut s);
     s.map(|v| v as f32)
-}
-
-/// Replaces the optics of `material` by a fabric's; its emission stays, its textures go. A fabric with a map of openness
-/// brings a texture; an XML file is a measurement (Klems matrix or tensor tree), of which the visible band is rendered.
-///
-/// # Errors
-/// A sentence when the file cannot be read or its model is no sheet.
-pub fn dress(material: &mut Material, file: &Path, textures: &mut Vec<Texture>) -> Result<()> {
-    if file
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("xml"))
-    {
-        let measured = Klems::read(file)
-            .and_then(|k| Tabulated::new(&k, "Visible"))
-            .map_err(|e| anyhow::anyhow!("{e}"))
-            .with_context(|| format!("the fabric of material '{}'", material.name))?;
-        *material = Material {
-            emission: material.emission,
-            double_sided: material.double_sided,
-            layer: material.layer,
-            ..Material::measured(&material.name, measured)
-        };
-        return Ok(());
-    }
-    let fabric = Fabric::read(file)
-        .map_err(|e| anyhow::anyhow!("{e}"))
-        .with_context(|| format!("the fabric of material '{}'", material.name))?;
-    let optics = fabric.optics().map_err(|e| anyhow::anyhow!("{e}"))?;
-    let back = fabric.optics_back().map_err(|e| anyhow::anyhow!("{e}"))?;
-    ensure!(
-        optics.model.name == "sheet",
-        "{} uses the model '{}'; only 'sheet' can be rendered: fit it with --model sheet",
-        file.display(),
-        optics.model.name
-    );
-    material.measured = None;
-    material.linear = optics.linear.map(|k| k.map(|v| v as f32));
-    material.back =
-        (back.linear != optics.linear).then(|| back.linear.map(|k| k.map(|v| v as f32)));
-    material.shape = optics.shape.map(|v| v as f32);
-    (
-        material.color_texture,
-        material.coverage_texture,
-        material.alpha_cutoff,
-    ) = (None, None, None);
-    material.multiplies = false;
-    if let Some(weave) = fabric.weave.filter(|w| !w.openness_map.is_empty()) {
-        let map = openness_map(
-            &file.with_file_name(&weave.openness_map),
-            &weave.openness_map,
-        )?;
-        textures.push(Texture::of_openness(
-            &weave.openness_map,
-            &map,
-            weave.map_multiplies,
-        ));
-        let [u, v] = weave
-            .map_repeats
-            .map(|r| if r == 0.0 { 1.0 } else { r as f32 });
-        material.coverage_texture = Some(TextureUse {
-            texture: textures.len() - 1,
-            transform: [[u, 0.0, 0.0], [0.0, v, 0.0]],
-        });
-        material.multiplies = weave.map_multiplies;
-    }
-    material.normal_texture = None;
-    Ok(())
-}
-
-/// Reads a map of openness from a picture: its luminance, white open.
-///
-/// # Errors
-/// A sentence when it lies elsewhere than beside the fabric, or is no picture of at most 64 megapixels.
-fn openness_map(path: &Path, name: &str) -> Result<OpennessMap> {
-    ensure!(
-        Path::new(name).file_name().is_some_and(|f| f == name),
-        "the openness map {name:?} must lie beside the fabric file: give a file name without folders"
-    );
-    let mut reader = image::ImageReader::open(path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .with_context(|| format!("cannot read the openness map {}", path.display()))?;
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(256 << 20);
-    (limits.max_image_width, limits.max_image_height) = (Some(8192), Some(8192));
-    reader.limits(limits);
-    let picture = reader
-        .decode()
-        .with_context(|| format!("the openness map {} is no picture", path.display()))?
-        .into_luma8();
-    let (w, h) = picture.dimensions();
-    let values = picture.iter().map(|p| f32::from(*p) / 255.0).collect();
-    OpennessMap::new(w as usize, h as usize, values).map_err(|e| anyhow::anyhow!("{e}"))
 }
 
 impl Pictures<'_> {

@@ -1,6 +1,8 @@
 //! The reference path tracer on the CPU. Its files pair with those of `shader/`, by name and line of thought.
 
+pub(crate) mod beam;
 pub(crate) mod bvh;
+pub(crate) mod camera;
 pub(crate) mod light;
 pub(crate) mod math;
 pub(crate) mod measured;

@@ -29,8 +29,9 @@ use pipeline::Pipeline;
 const AIM: Duration = Duration::from_millis(50);
 /// No submit should take longer.
 const LIMIT: Duration = Duration::from_millis(200);
-/// A device that does not answer for this long is lost.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// A device that does not answer for this long is lost. Long, for lavapipe compiles a shader at its first use, which takes
+/// half a minute where other programs run.
+const PATIENCE: Duration = Duration::from_secs(180);
 
 /// A device and the compiled shader: made once in a process and shared, for compiling takes seconds.
 struct Context {

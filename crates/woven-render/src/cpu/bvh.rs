@@ -10,6 +10,9 @@ use crate::table::Table;
 /// Below this product a shadow ray goes on only by a fair coin at each further sheet.
 pub(crate) const FAINT: f32 = 1e-3;
 
+/// Below this product nothing passes where no coin is tossed.
+pub(crate) const FAINTEST: f32 = 1e-12;
+
 /// Farther than anything.
 pub(crate) const FAR: f32 = 3.0e38;
 
@@ -35,6 +38,12 @@ pub(crate) struct Ray {
 }
 
 impl Ray {
+    /// One over the direction, without infinities.
+    #[inline(always)]
+    pub(crate) fn inv(&self) -> Vec3 {
+        self.inv
+    }
+
     #[inline(always)]
     pub(crate) fn new(o: Vec3, d: Vec3) -> Self {
         let inverse = |x: f32| {
@@ -163,9 +172,10 @@ pub(crate) fn transmittance(table: &Table, ray: &Ray, tmax: f32, rng: &mut Rng) 
     product(table, ray, tmax, FAINT, || rng.coin())
 }
 
-/// The same without a coin for faint light.
+/// The same without a coin for faint light: what a beam does for each of its rays.
+#[cfg(test)]
 pub(crate) fn transmittance_exact(table: &Table, ray: &Ray, tmax: f32) -> f32 {
-    product(table, ray, tmax, 1e-12, || 0.0)
+    product(table, ray, tmax, FAINTEST, || 0.0)
 }
 
 /// The product of the gaps; below `faint` it ends with an even coin.

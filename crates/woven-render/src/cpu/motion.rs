@@ -4,7 +4,8 @@ use anyhow::{Context, Result, ensure};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::bvh::{FAR, Ray, nearest};
+use super::bvh::{FAR, nearest};
+use super::camera::camera_ray;
 use super::path::View;
 use crate::table::Table;
 
@@ -30,10 +31,8 @@ pub(crate) fn motion(
     );
     let pixel = |i: usize| {
         let (x, y) = (i % view.width as usize, i / view.width as usize);
-        let sx = (x as f32 + 0.5) / view.width as f32 * 2.0 - 1.0;
-        let sy = 1.0 - (y as f32 + 0.5) / view.height as f32 * 2.0;
-        let d = view.forward + view.right * sx + view.up * sy;
-        let hit = nearest(table, &Ray::new(view.eye, d.normalize()), 0.0, FAR)?;
+        let ray = camera_ray(view, x as u32, y as u32, [0.5, 0.5, 0.0, 0.0]);
+        let hit = nearest(table, &ray, 0.0, FAR)?;
         let shade = &table.shade[hit.place as usize];
         if shade.mesh as usize != mesh {
             return None;

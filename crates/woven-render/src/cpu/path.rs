@@ -1,26 +1,14 @@
-//! One sample of one pixel. The pair of `shader/path.wgsl`.
-//!
-//! A camera ray goes straight on through every sheet it meets. At each crossing the light that the sheet scatters
-//! towards the eye is estimated with weight (product of the gaps before it). Indirect light is gathered at the first
-//! crossing and at one of those behind; the path that finds it begins at one of the two, chosen in proportion to what
-//! the crossings contribute. So the view through the cloth is as clean as without it, and there is no coin in the
-//! picture of the cloth itself.
+//! The path of one sample of one pixel, from where its camera ray is scattered. The pair of `shader/path.wgsl`, together
+//! with `camera.rs`.
 
 use glam::Vec3;
 
-use super::bvh::{FAINT, FAR, Ray, nearest, transmittance};
+use super::bvh::{FAR, Ray, nearest, transmittance};
 use super::light::{self, Place};
-use super::math::luminance;
 use super::surface::{self, Surface};
 use crate::rng::Rng;
 use crate::scene::LAYERS;
-use crate::table::{
-    EMITTED, MATT, MaterialRow, NONE, PASSED, REFLECTED, TRANSMITS, TRANSMITTED, Table,
-};
-
-/// Sheets at which a camera ray is lit (random numbers: set 0 is the camera's, then one set a crossing); beyond it goes
-/// on dark (the product of as many gaps is below any noise).
-const CROSSINGS: u32 = 64;
+use crate::table::{MATT, MaterialRow, NONE, PASSED, REFLECTED, TRANSMITS, TRANSMITTED, Table};
 
 /// A path survives with the probability of what it carries times this. Measured on the bench scene (relMSE x CPU-s at
 /// 160 x 120, 32 spp; `examples/measure.rs`): 0.5 gives 0.042, 1 0.030, 3 0.022, 6 0.023, no roulette 0.023.
@@ -68,12 +56,12 @@ pub(crate) struct Sample {
 #[derive(Clone, Copy)]
 pub(super) struct Vertex {
     pub s: Surface,
-    at: Place,
+    pub at: Place,
     pub wo: Vec3,
     /// What is scattered here reaches the eye times this.
     pub throughput: Vec3,
     /// The first sheet that the camera's ray meets.
-    front: bool,
+    pub front: bool,
 }
 
 impl Vertex {
@@ -131,7 +119,7 @@ pub(super) struct Begun {
     pub second: Option<Second>,
 }
 
-fn towards_eye(s: &Surface, d: Vec3) -> Vec3 {
+pub(super) fn towards_eye(s: &Surface, d: Vec3) -> Vec3 {
     if s.frame[2].dot(d) > 0.0 {
         -s.frame[2]
     } else {
@@ -139,7 +127,7 @@ fn towards_eye(s: &Surface, d: Vec3) -> Vec3 {
     }
 }
 
-fn place(table: &Table, m: &MaterialRow, s: &Surface, d: Vec3) -> Place {
+pub(super) fn place(table: &Table, m: &MaterialRow, s: &Surface, d: Vec3) -> Place {
     light::place(table, s.p, towards_eye(s, d), m.flags & TRANSMITS != 0)
 }
 
@@ -180,19 +168,36 @@ impl Incident {
     }
 }
 
-/// Samples a light for a place that is seen from `wo` (in the sheet's frame): the light, and what is scattered towards
-/// `wo`; nothing where that is black.
-fn incident(
+/// A sampled light before its shadow ray is followed.
+pub(super) struct Unseen {
+    found: Incident,
+    /// What is scattered towards the viewer if nothing is between.
+    value: Vec3,
+    pub ray: Ray,
+    pub end: f32,
+}
+
+impl Unseen {
+    /// The light that gets through, and what is scattered of it.
+    #[inline(always)]
+    pub(super) fn pass(mut self, passed: f32) -> (Incident, Vec3) {
+        self.found.light *= passed;
+        (self.found, self.value * passed)
+    }
+}
+
+/// Samples a light for a place that is seen from `wo` (in the sheet's frame); nothing where what is scattered towards
+/// `wo` is black.
+pub(super) fn incident(
     table: &Table,
     m: &MaterialRow,
     s: &Surface,
     at: &Place,
     wo: Vec3,
     u: [f32; 4],
-    rng: &mut Rng,
-) -> Option<(Incident, Vec3)> {
+) -> Option<Unseen> {
     let l = light::sample(table, at, [u[0], u[1], u[2]])?;
-    let mut found = Incident {
+    let found = Incident {
         wi: l.wi,
         light: l.radiance * (s.local(l.wi).z.abs() / l.pdf),
         pdf: if l.meets && (l.shared || shares(m)) {
@@ -203,165 +208,22 @@ fn incident(
         layer: l.layer,
     };
     let value = found.scattered(table, m, s, wo);
-    if value.max_element() <= 0.0 {
-        return None;
-    }
-    let ray = Ray::new(s.leave(table, l.wi), l.wi);
-    let passed = transmittance(table, &ray, l.distance - (1e-4 + 1e-4 * l.distance), rng);
-    found.light *= passed;
-    Some((found, value * passed))
-}
-
-/// The camera ray of pixel (x, y).
-fn camera_ray(view: &View, x: u32, y: u32, u: [f32; 4]) -> Ray {
-    let sx = (x as f32 + u[0]) / view.width as f32 * 2.0 - 1.0;
-    let sy = 1.0 - (y as f32 + u[1]) / view.height as f32 * 2.0;
-    let d = view.forward + view.right * sx + view.up * sy;
-    if view.aperture <= 0.0 {
-        return Ray::new(view.eye, d.normalize());
-    }
-    let (sin, cos) = super::math::sincos_turn(u[2]);
-    let r = view.aperture * u[3].sqrt();
-    let lens = view.lens_x * (r * cos) + view.lens_y * (r * sin);
-    Ray::new(view.eye + lens, (d * view.focus - lens).normalize())
-}
-
-/// Sample `index` of pixel (x, y), as far as a pixel goes alone; `paths` are the random numbers of its path.
-pub(super) fn begin(
-    table: &Table,
-    view: &View,
-    x: u32,
-    y: u32,
-    index: u32,
-    paths: &mut Rng,
-) -> Begun {
-    let mut out = Sample::default();
-    let mut rng = Rng::new(x, y, index, view.seed);
-    let ray = camera_ray(view, x, y, rng.set(0));
-    let mut passed = 1.0_f32;
-    let mut tmin = 0.0;
-    let mut found: [Option<Vertex>; FIRSTS] = [None; FIRSTS];
-    // Weight of the first, and of the rest with that of the one that stands for them.
-    let (mut front, mut rest, mut kept) = (0.0, 0.0, 0.0);
-    let mut pick = rng.coin();
-    for crossing in 0..CROSSINGS {
-        let Some(hit) = nearest(table, &ray, tmin, FAR) else {
-            let straight = |light| layer(table, PASSED, light);
-            add(
-                &mut out.direct,
-                straight(table.globals.sky_layer),
-                light::sky(table, ray.d) * passed,
-            );
-            light::discs(table, ray.d, |light, l| {
-                add(&mut out.direct, straight(light), l * passed);
-            });
-            break;
-        };
-        let s = surface::surface(table, &hit, hit.t * view.up.length() / view.height as f32);
-        let m = &table.materials[s.material as usize];
-        let wo = s.local(-ray.d);
-        let gap = surface::gap(table, m, &s, ray.d);
-        let given = if crossing == 0 { EMITTED } else { PASSED };
-        add(
-            &mut out.direct,
-            layer(table, given, m.layer),
-            surface::emission(table, m, &s, -ray.d) * (passed * (1.0 - gap)),
-        );
-        let albedo = m.emission[3] * luminance(s.tint);
-        if crossing == 0 {
-            out.normal = towards_eye(&s, ray.d);
-            out.depth = hit.t;
-        }
-        out.albedo += reflectance(m, &s, wo) * (passed * (1.0 - gap));
-        let weight = passed * (1.0 - gap) * albedo;
-        if weight > 0.0 && view.depth > 0 {
-            let at = place(table, m, &s, ray.d);
-            let u = rng.set(1 + crossing);
-            let vertex = Vertex {
-                s,
-                at,
-                wo,
-                throughput: Vec3::splat(passed),
-                front: crossing == 0,
-            };
-            if let Some((l, value)) = incident(table, m, &s, &at, wo, u, &mut rng) {
-                let event = vertex.event(s.local(l.wi));
-                add(
-                    &mut out.direct,
-                    layer(table, event, l.layer),
-                    value * passed,
-                );
-            }
-            if found[0].is_none() {
-                found[0] = Some(vertex);
-                front = weight;
-            } else {
-                // Reservoir of one: each crossing is kept in proportion to its weight.
-                rest += weight;
-                let keep = weight / rest;
-                if pick < keep {
-                    pick /= keep;
-                    found[1] = Some(vertex);
-                    kept = weight;
-                } else {
-                    pick = (pick - keep) / (1.0 - keep);
-                }
-            }
-        }
-        passed *= gap;
-        if passed <= 0.0 {
-            break;
-        }
-        out.gap = passed;
-        if passed < FAINT {
-            if rng.coin() < 0.5 {
-                out.gap = 0.0;
-                break;
-            }
-            passed *= 2.0;
-        }
-        tmin = hit.t * (1.0 + 2e-6) + table.globals.offset;
-    }
-    if let Some(v) = &mut found[1] {
-        v.throughput *= rest / kept;
-    }
-    let share = front / (front + rest).max(1e-30);
-    let shares = [share, 1.0 - share];
-    let chosen = usize::from(pick >= share && found[1].is_some());
-    let mut second = None;
-    if let Some(mut v) = found[chosen] {
-        v.throughput /= shares[chosen];
-        second = follow(table, view, &v, paths, &mut out);
-    }
-    let first = |i: usize| {
-        found[i].map(|vertex| First {
-            vertex,
-            share: shares[i],
-        })
-    };
-    Begun {
-        sample: out,
-        firsts: [first(0), first(1)],
-        chosen,
-        second,
-    }
-}
-
-/// Sum of the factors on the side of `wo`.
-fn reflectance(m: &MaterialRow, s: &Surface, wo: Vec3) -> Vec3 {
-    let back = surface::side(wo);
-    let k = |j: usize| Vec3::new(m.linear[j][0], m.linear[j][1], m.linear[j][2]);
-    (k(0) + k(1) + k(2 + back) + k(3 + back) + k(4 + back)) * s.tint
+    (value.max_element() > 0.0).then(|| Unseen {
+        found,
+        value,
+        ray: Ray::new(s.leave(table, l.wi), l.wi),
+        end: l.distance - (1e-4 + 1e-4 * l.distance),
+    })
 }
 
 #[inline(always)]
-fn add(light: &mut [Vec3; LAYERS], layer: u32, value: Vec3) {
+pub(super) fn add(light: &mut [Vec3; LAYERS], layer: u32, value: Vec3) {
     light[(layer as usize).min(LAYERS - 1)] += value;
 }
 
 /// Follows the path that scatters at `first` until it ends. What it meets without a second scattering is added to
 /// `own`, and so is what comes through the second point if only this very path may use it; the rest is returned.
-fn follow(
+pub(super) fn follow(
     table: &Table,
     view: &View,
     first: &Vertex,
@@ -469,7 +331,10 @@ fn follow(
         let at = place(table, m, &s, d);
         let wo = s.local(-d);
         let u = rng.set(2 * bounce + 1);
-        let lit = incident(table, m, &s, &at, wo, u, rng);
+        let lit = incident(table, m, &s, &at, wo, u).map(|l| {
+            let passed = transmittance(table, &l.ray, l.end, rng);
+            l.pass(passed)
+        });
         // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
         let yarn = 1.0 / (1.0 - gap).max(1e-6);
         v.throughput *= yarn;

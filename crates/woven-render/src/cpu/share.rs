@@ -11,9 +11,11 @@
 
 use glam::Vec3;
 
-use super::bvh::{Ray, transmittance_exact};
+use super::beam::{Beam, MOST};
+use super::bvh::Ray;
+use super::camera;
 use super::math::luminance;
-use super::path::{self, Begun, FIRSTS, First, Sample, Second, View};
+use super::path::{Begun, FIRSTS, First, Sample, Second, View, layer};
 use super::surface;
 use crate::rng::{Rng, hash, hash2};
 use crate::table::Table;
@@ -21,7 +23,8 @@ use crate::table::Table;
 /// Side of a block of pixels.
 pub(crate) const BLOCK: u32 = 8;
 /// Pixels in a block.
-const GROUP: usize = (BLOCK * BLOCK) as usize;
+pub(super) const GROUP: usize = (BLOCK * BLOCK) as usize;
+const _: () = assert!(FIRSTS * GROUP <= MOST, "a beam holds the rays of a block");
 /// About as many second points are looked at. Measured on the bench scene (relMSE x CPU-s at 320 x 240, 16 spp;
 /// `examples/measure.rs`): 8 gives 0.033, 16 0.026, all 64 some 0.03; without sharing 0.32.
 const KEPT: f32 = 16.0;
@@ -53,21 +56,24 @@ pub(super) fn block(
         let y = u32::try_from(y0 + (member as u32 / BLOCK) as i32).ok()?;
         (x < view.width && y < view.height).then_some((x, y))
     };
+    let pixels = std::array::from_fn(pixel);
+    let mut beam = Beam::new();
+    let mut walks = camera::walk(table, view, &pixels, index, &mut beam);
     let mut coins = [0.0; GROUP];
     let mut group: [Option<Begun>; GROUP] = std::array::from_fn(|member| {
-        let (x, y) = pixel(member)?;
+        let walk = walks[member].take()?;
         let slice = index * GROUP as u32 + (member as u32 ^ turn);
         let mut paths = Rng::new(0, 0, slice, here);
-        let begun = path::begin(table, view, x, y, index, &mut paths);
+        let begun = walk.follow(table, view, &mut paths);
         coins[member] = paths.coin();
         Some(begun)
     });
-    gather(table, &mut group, &coins);
+    gather(table, &mut group, &coins, &mut beam);
     let place = |(x, y): (u32, u32)| (y * view.width + x) as usize;
     group
         .into_iter()
         .enumerate()
-        .filter_map(|(member, begun)| Some((place(pixel(member)?), begun?.sample)))
+        .filter_map(|(member, begun)| Some((place(pixels[member]?), begun?.sample)))
         .collect()
 }
 
@@ -83,7 +89,12 @@ struct Sight {
 }
 
 /// Distributes the light of all second points over all first points.
-fn gather(table: &Table, group: &mut [Option<Begun>; GROUP], coins: &[f32; GROUP]) {
+fn gather(
+    table: &Table,
+    group: &mut [Option<Begun>; GROUP],
+    coins: &[f32; GROUP],
+    beam: &mut Beam,
+) {
     let bright: [f32; GROUP] = std::array::from_fn(|i| {
         let second = group[i].as_ref().and_then(|b| b.second.as_ref());
         second.map_or(0.0, |y| brightness(table, y))
@@ -102,17 +113,30 @@ fn gather(table: &Table, group: &mut [Option<Begun>; GROUP], coins: &[f32; GROUP
         };
         let chosen = begun.chosen;
         let side = y.s.ng.dot(y.s.p - own.vertex.s.p) < 0.0;
-        let mut all = 0.0;
         let mut sights = [[Sight::default(); FIRSTS]; GROUP];
-        for (k, sights) in sights.iter_mut().enumerate() {
-            let Some(begun) = &group[k] else { continue };
-            for (which, (sight, first)) in sights.iter_mut().zip(&begun.firsts).enumerate() {
-                if let Some(first) = first {
-                    *sight = look(table, first, &y, side, (k, which) == (i, chosen));
-                    all += sight.density;
+        // The rays of the beam by number: where they belong, and the share of the solid angle.
+        let mut rays = [(0, 0, 0.0); MOST];
+        beam.clear();
+        for which in 0..FIRSTS {
+            for k in 0..GROUP {
+                let first = group[k].as_ref().and_then(|b| b.firsts[which].as_ref());
+                let Some(look) = first.and_then(|f| look(table, f, &y, side)) else {
+                    continue;
+                };
+                sights[k][which] = look.sight;
+                if (k, which) == (i, chosen) {
+                    sights[k][which].pass(look.angle, y.passed);
+                } else {
+                    let n = beam.add(&look.ray, 0.0, look.end);
+                    rays[n] = (k, which, look.angle);
                 }
             }
         }
+        beam.pass(table);
+        for (n, &(k, which, angle)) in rays[..beam.count()].iter().enumerate() {
+            sights[k][which].pass(angle, beam.passed(n));
+        }
+        let all: f32 = sights.iter().flatten().map(|s| s.density).sum();
         let m = &table.materials[y.s.material as usize];
         for (sights, begun) in sights.iter().zip(group.iter_mut()) {
             let Some(begun) = begun else { continue };
@@ -120,7 +144,7 @@ fn gather(table: &Table, group: &mut [Option<Begun>; GROUP], coins: &[f32; GROUP
                 // By event all that comes this way is of one layer.
                 let event =
                     begun.firsts[which].map_or(0, |x| x.vertex.event(x.vertex.s.local(sight.d)));
-                let into = |light: usize| path::layer(table, event, light as u32) as usize;
+                let into = |light: usize| layer(table, event, light as u32) as usize;
                 let carry = sight.carry * (1.0 / (q * all));
                 let wo = y.s.local(-sight.d);
                 let light = &mut begun.sample.indirect;
@@ -141,7 +165,27 @@ fn brightness(table: &Table, y: &Second) -> f32 {
     if l.is_finite() { l } else { 0.0 }
 }
 
-fn look(table: &Table, first: &First, y: &Second, side: bool, own: bool) -> Sight {
+/// A look from a first point at a second one before its ray is followed.
+struct Look {
+    /// As if nothing stood between, per solid angle.
+    sight: Sight,
+    /// Solid angle over area.
+    angle: f32,
+    ray: Ray,
+    end: f32,
+}
+
+impl Sight {
+    /// The share `passed` of it gets through; from solid angle to area.
+    #[inline(always)]
+    fn pass(&mut self, angle: f32, passed: f32) {
+        let seen = angle * passed;
+        self.density *= seen;
+        self.carry *= seen;
+    }
+}
+
+fn look(table: &Table, first: &First, y: &Second, side: bool) -> Option<Look> {
     let x = &first.vertex;
     let from = x.s.leave(table, y.s.p - x.s.p);
     let to = y.s.p - from;
@@ -150,28 +194,20 @@ fn look(table: &Table, first: &First, y: &Second, side: bool, own: bool) -> Sigh
     let d = to * (1.0 / distance);
     let cos = y.s.ng.dot(d);
     if (cos < 0.0) != side {
-        return Sight::default();
+        return None;
     }
     let m = &table.materials[x.s.material as usize];
     let wi = x.s.local(d);
     let yarn = 1.0 - surface::gap(table, &table.materials[y.s.material as usize], &y.s, d);
     let density = first.share * surface::density(table, m, &x.s, x.wo, wi) * yarn;
     if density <= 0.0 {
-        return Sight::default();
+        return None;
     }
-    let passed = if own {
-        y.passed
-    } else {
-        transmittance_exact(
-            table,
-            &Ray::new(from, d),
-            distance - (1e-4 + 1e-4 * distance),
-        )
-    };
-    let seen = cos.abs() / distance2 * passed;
-    Sight {
-        density: density * seen,
-        carry: x.throughput * surface::evaluate(table, m, &x.s, wi, x.wo) * (wi.z.abs() * seen),
-        d,
-    }
+    let carry = x.throughput * surface::evaluate(table, m, &x.s, wi, x.wo) * wi.z.abs();
+    Some(Look {
+        sight: Sight { density, carry, d },
+        angle: cos.abs() / distance2,
+        ray: Ray::new(from, d),
+        end: distance - (1e-4 + 1e-4 * distance),
+    })
 }

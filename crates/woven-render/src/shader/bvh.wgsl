@@ -41,7 +41,7 @@ fn bits(lanes: vec4<bool>) -> u32 {
     return dot(select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), lanes), vec4<u32>(1u));
 }
 
-fn boxes(n: u32, ray: Ray, tmax: f32) -> Boxes {
+fn boxes(n: u32, ray: Ray, tmin: f32, tmax: f32) -> Boxes {
     let ax = (nodes[n].lo[0] - ray.o.x) * ray.inv.x;
     let bx = (nodes[n].hi[0] - ray.o.x) * ray.inv.x;
     let ay = (nodes[n].lo[1] - ray.o.y) * ray.inv.y;
@@ -50,7 +50,7 @@ fn boxes(n: u32, ray: Ray, tmax: f32) -> Boxes {
     let bz = (nodes[n].hi[2] - ray.o.z) * ray.inv.z;
     let near = max(
         max(select(ax, bx, ray.inv.x < 0.0), select(ay, by, ray.inv.y < 0.0)),
-        max(select(az, bz, ray.inv.z < 0.0), vec4<f32>(0.0)),
+        max(select(az, bz, ray.inv.z < 0.0), vec4<f32>(tmin)),
     );
     let far = min(
         min(select(bx, ax, ray.inv.x < 0.0), select(by, ay, ray.inv.y < 0.0)),
@@ -97,46 +97,55 @@ fn triangles(p: u32, ray: Ray, tmin: f32, tmax: f32) -> Four {
 }
 
 // The nearest hit between tmin and tmax; its place is EMPTY when there is none.
+//
+// Both walks go down to a leaf in a loop of its own and test its triangles outside of it (Aila and Laine 2009): where
+// rays run side by side, those at nodes would else wait at every step for one at a leaf.
 fn nearest(ray: Ray, tmin: f32, tmax: f32) -> Hit {
     var hit = Hit(tmax, EMPTY, 0.0, 0.0);
     stack[0] = 0u;
-    entries[0] = 0.0;
+    entries[0] = tmin;
     var top = 1u;
-    while (top > 0u) {
-        top -= 1u;
-        let child = stack[top];
-        if (entries[top] >= hit.t) {
-            continue;
-        }
-        if ((child & LEAF) != 0u) {
-            let packet = child & ~LEAF;
-            let four = triangles(packet, ray, tmin, hit.t);
-            var mask = four.hit;
+    loop {
+        var packet = EMPTY;
+        while (top > 0u) {
+            top -= 1u;
+            let child = stack[top];
+            if (entries[top] >= hit.t) {
+                continue;
+            }
+            if ((child & LEAF) != 0u) {
+                packet = child & ~LEAF;
+                break;
+            }
+            let b = boxes(child, ray, tmin, hit.t);
+            let base = top;
+            var mask = b.hit;
             while (mask != 0u) {
                 let lane = firstTrailingBit(mask);
                 mask &= mask - 1u;
-                if (four.t[lane] < hit.t) {
-                    hit = Hit(four.t[lane], packet * 4u + lane, four.u[lane], four.v[lane]);
+                let entry = b.near[lane];
+                var at = top;
+                while (at > base && entries[at - 1u] < entry) {
+                    stack[at] = stack[at - 1u];
+                    entries[at] = entries[at - 1u];
+                    at -= 1u;
                 }
+                stack[at] = nodes[child].child[lane];
+                entries[at] = entry;
+                top += 1u;
             }
-            continue;
         }
-        let b = boxes(child, ray, hit.t);
-        let base = top;
-        var mask = b.hit;
+        if (packet == EMPTY) {
+            return hit;
+        }
+        let four = triangles(packet, ray, tmin, hit.t);
+        var mask = four.hit;
         while (mask != 0u) {
             let lane = firstTrailingBit(mask);
             mask &= mask - 1u;
-            let entry = b.near[lane];
-            var at = top;
-            while (at > base && entries[at - 1u] < entry) {
-                stack[at] = stack[at - 1u];
-                entries[at] = entries[at - 1u];
-                at -= 1u;
+            if (four.t[lane] < hit.t) {
+                hit = Hit(four.t[lane], packet * 4u + lane, four.u[lane], four.v[lane]);
             }
-            stack[at] = nodes[child].child[lane];
-            entries[at] = entry;
-            top += 1u;
         }
     }
     return hit;
@@ -148,11 +157,16 @@ fn transmittance(ray: Ray, tmax: f32, faint: f32, exact: bool, rng: ptr<function
     var product = 1.0;
     stack[0] = 0u;
     var top = 1u;
-    while (top > 0u) {
-        top -= 1u;
-        let child = stack[top];
-        if ((child & LEAF) == 0u) {
-            let b = boxes(child, ray, tmax);
+    loop {
+        var packet = EMPTY;
+        while (top > 0u) {
+            top -= 1u;
+            let child = stack[top];
+            if ((child & LEAF) != 0u) {
+                packet = child & ~LEAF;
+                break;
+            }
+            let b = boxes(child, ray, 0.0, tmax);
             var mask = b.hit;
             while (mask != 0u) {
                 let lane = firstTrailingBit(mask);
@@ -160,9 +174,10 @@ fn transmittance(ray: Ray, tmax: f32, faint: f32, exact: bool, rng: ptr<function
                 stack[top] = nodes[child].child[lane];
                 top += 1u;
             }
-            continue;
         }
-        let packet = child & ~LEAF;
+        if (packet == EMPTY) {
+            return product;
+        }
         let four = triangles(packet, ray, 0.0, tmax);
         // One copy of the code for the four lanes: what is asked of a sheet is long.
         var mask = four.hit;

@@ -1,4 +1,4 @@
-// One sample of one pixel, as far as a pixel goes alone; the pair of cpu/path.rs.
+// One sample of one pixel, as far as a pixel goes alone; the pair of cpu/camera.rs and cpu/path.rs.
 
 const CROSSINGS: u32 = 64u;
 const ROULETTE: f32 = 3.0;

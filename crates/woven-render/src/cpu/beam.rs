@@ -1,0 +1,214 @@
+//! Many rays at once: the camera's through a block of pixels, and those that look from there at one point. Eight rays
+//! side by side are tested against a box; a box that no ray of the beam can meet is found by one test for all.
+//!
+//! Each shadow ray meets the same triangles in the same order as alone ([`super::bvh`]), so that the product of its
+//! gaps has the same bits. The loops over lanes are plain Rust, compiled once for the base instruction set and once
+//! for AVX2; nothing is contracted, so both give the same bits too.
+//!
+//! After Boulos, Wald and Shirley 2006, "Geometric and arithmetic culling methods for entire ray packets", and Overbeck,
+//! Ramamoorthi and Mark 2008, "Large ray packets for real-time Whitted ray tracing".
+
+mod group;
+
+use glam::Vec3;
+
+use super::bvh::{Hit, Ray};
+use crate::bvh::{EMPTY, LEAF, STACK};
+use crate::table::Table;
+use group::{Group, Hull, Lanes, used};
+
+/// Rays side by side.
+const LANES: usize = 8;
+/// Most groups of them.
+const GROUPS: usize = 16;
+/// Most rays of a beam.
+pub(super) const MOST: usize = LANES * GROUPS;
+
+/// Rays side by side.
+pub(super) struct Beam {
+    groups: [Group; GROUPS],
+    count: usize,
+}
+
+impl Beam {
+    pub(super) fn new() -> Self {
+        Self {
+            groups: [Group::NONE; GROUPS],
+            count: 0,
+        }
+    }
+
+    /// Empties it.
+    pub(super) fn clear(&mut self) {
+        let used = self.count.div_ceil(LANES);
+        self.groups[..used].fill(Group::NONE);
+        self.count = 0;
+    }
+
+    /// Adds a ray between the distances `begin` and `end`; its number. At most [`MOST`].
+    pub(super) fn add(&mut self, ray: &Ray, begin: f32, end: f32) -> usize {
+        let n = self.count;
+        let (group, lane) = (&mut self.groups[n / LANES], n % LANES);
+        for axis in 0..3 {
+            group.o[axis].0[lane] = ray.o[axis];
+            group.d[axis].0[lane] = ray.d[axis];
+            group.inv[axis].0[lane] = ray.inv()[axis];
+        }
+        group.begin.0[lane] = begin;
+        group.end.0[lane] = end;
+        self.count += 1;
+        n
+    }
+
+    /// Rays in it.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// What passed along ray `n`.
+    pub(super) fn passed(&self, n: usize) -> f32 {
+        self.groups[n / LANES].product.0[n % LANES]
+    }
+
+    /// What ray `n` met first.
+    pub(super) fn hit(&self, n: usize) -> Option<Hit> {
+        let (group, lane) = (&self.groups[n / LANES], n % LANES);
+        (group.place[lane] != EMPTY).then(|| Hit {
+            t: group.end.0[lane],
+            place: group.place[lane],
+            u: group.u.0[lane],
+            v: group.v.0[lane],
+        })
+    }
+
+    fn hull(&self) -> Hull {
+        let mut hull = Hull {
+            o: [Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX)],
+            inv: [Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX)],
+            begin: f32::MAX,
+            end: 0.0,
+        };
+        for n in 0..self.count {
+            let (group, lane) = (&self.groups[n / LANES], n % LANES);
+            let at = |v: &[Lanes; 3]| Vec3::new(v[0].0[lane], v[1].0[lane], v[2].0[lane]);
+            let (o, inv) = (at(&group.o), at(&group.inv));
+            hull.o = [hull.o[0].min(o), hull.o[1].max(o)];
+            hull.inv = [hull.inv[0].min(inv), hull.inv[1].max(inv)];
+            hull.begin = hull.begin.min(group.begin.0[lane]);
+            hull.end = hull.end.max(group.end.0[lane]);
+        }
+        hull
+    }
+
+    /// Follows all rays to their ends through all gaps: as [`super::bvh::transmittance`], without its coin for faint light.
+    pub(super) fn pass(&mut self, table: &Table) {
+        pulp::Arch::new().dispatch(Pass(self, table));
+    }
+
+    /// Finds what each ray meets first: as [`super::bvh::nearest`].
+    pub(super) fn nearest(&mut self, table: &Table) {
+        pulp::Arch::new().dispatch(Nearest(self, table));
+    }
+
+    /// Every triangle that a group of rays may meet; for the `NEAREST` the nearer boxes first.
+    #[inline(always)]
+    fn walk<const NEAREST: bool>(&mut self, table: &Table) {
+        if self.count == 0 || table.bvh.nodes.is_empty() {
+            return;
+        }
+        let hull = self.hull();
+        let all = (1_u32 << self.count.div_ceil(LANES)) - 1;
+        let mut stack = [(0_u32, 0_u32); STACK];
+        stack[0] = (0, all);
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (child, groups) = stack[top];
+            if child & LEAF != 0 {
+                let packet = child & !LEAF;
+                let leaf = &table.bvh.packets[packet as usize];
+                let used = used(leaf);
+                for g in Bits(groups) {
+                    let group = &mut self.groups[g];
+                    for k in 0..used {
+                        if NEAREST {
+                            group.keep(leaf, packet, k);
+                        } else {
+                            group.pass(table, leaf, packet, k);
+                        }
+                    }
+                }
+                continue;
+            }
+            let node = &table.bvh.nodes[child as usize];
+            let (near, mask) = hull.boxes(node);
+            let base = top;
+            let mut entries = [0.0_f32; 4];
+            for lane in Bits(mask) {
+                let child = node.child[lane];
+                if child == EMPTY {
+                    continue;
+                }
+                let mut met = 0;
+                for g in Bits(groups) {
+                    met |= u32::from(self.groups[g].meets(node, lane)) << g;
+                }
+                if met == 0 {
+                    continue;
+                }
+                // With an order, the farthest goes down first.
+                let mut at = top;
+                if NEAREST {
+                    while at > base && entries[at - base - 1] < near[lane] {
+                        stack[at] = stack[at - 1];
+                        entries[at - base] = entries[at - base - 1];
+                        at -= 1;
+                    }
+                    entries[at - base] = near[lane];
+                }
+                stack[at] = (child, met);
+                top += 1;
+            }
+        }
+    }
+}
+
+// Types of their own in place of closures: what calls a closure is not always compiled into the wide copy.
+
+struct Pass<'a>(&'a mut Beam, &'a Table);
+
+impl pulp::NullaryFnOnce for Pass<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let Self(beam, table) = self;
+        beam.walk::<false>(table);
+    }
+}
+
+struct Nearest<'a>(&'a mut Beam, &'a Table);
+
+impl pulp::NullaryFnOnce for Nearest<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let Self(beam, table) = self;
+        beam.walk::<true>(table);
+    }
+}
+
+/// The bits that are set, from the lowest.
+struct Bits(u32);
+
+impl Iterator for Bits {
+    type Item = usize;
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let lowest = self.0.trailing_zeros();
+        self.0 &= self.0.wrapping_sub(1);
+        (lowest < 32).then_some(lowest as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -120,21 +120,18 @@ impl Buffers {
         })
     }
 
-    /// Writes a changed table; buffers that fit are kept.
+    /// Writes what moves of a table whose meshes have moved: pictures, materials and environment stay as they are there.
     pub(super) fn update(
         &mut self,
         device: &Device,
         pipeline: &Pipeline,
         table: &Table,
     ) -> Result<()> {
-        let rows = rows(table);
-        let same = rows
-            .iter()
-            .zip(&self.scene)
-            .all(|((_, bytes), b)| bytes.len() as u64 == b.size());
-        if same {
-            for ((_, bytes), b) in rows.iter().zip(&self.scene) {
-                device.queue.write_buffer(b, 0, bytes);
+        let moving = moving(table);
+        let fits = |(at, _, bytes): &Moving| bytes.len() as u64 == self.scene[*at].size();
+        if moving.iter().all(fits) {
+            for (at, _, bytes) in &moving {
+                device.queue.write_buffer(&self.scene[*at], 0, bytes);
             }
             return device.check();
         }
@@ -145,13 +142,26 @@ impl Buffers {
     }
 }
 
-/// The table's rows as bytes, in the order of the shader's bindings. No buffer is empty.
-fn rows(table: &Table) -> Vec<(&'static str, Vec<u8>)> {
+/// Rows as bytes, with their place among the scene's buffers and a name.
+type Moving = (usize, &'static str, Vec<u8>);
+
+/// What changes when meshes move.
+fn moving(table: &Table) -> [Moving; 4] {
     let nowhere = Node {
         lo: [Vec4::splat(1e30); 3],
         hi: [Vec4::splat(-1e30); 3],
         child: [EMPTY; 4],
     };
+    [
+        (0, "nodes", bytes(&table.bvh.nodes, nowhere)),
+        (1, "triangles", bytes(&table.bvh.packets, Packet::default())),
+        (2, "normals", bytes(&table.shade, Shade::default())),
+        (5, "lights", bytes(&table.lights, LightRow::default())),
+    ]
+}
+
+/// The table's rows as bytes, in the order of the shader's bindings. No buffer is empty.
+fn rows(table: &Table) -> Vec<(&'static str, Vec<u8>)> {
     let mut texels: Vec<u32> = crate::cpu::surface::SRGB
         .iter()
         .map(|x| x.to_bits())
@@ -177,15 +187,16 @@ fn rows(table: &Table) -> Vec<(&'static str, Vec<u8>)> {
             ..*m
         })
         .collect();
-    vec![
-        ("nodes", bytes(&table.bvh.nodes, nowhere)),
-        ("triangles", bytes(&table.bvh.packets, Packet::default())),
-        ("normals", bytes(&table.shade, Shade::default())),
-        ("materials", bytes(&materials, MaterialRow::zeroed())),
-        ("textures", bytes(&texels, 0)),
-        ("lights", bytes(&table.lights, LightRow::default())),
-        ("environment", bytes(&table.sky, [0.0_f32; 4])),
-    ]
+    let mut rows = vec![
+        (3, "materials", bytes(&materials, MaterialRow::zeroed())),
+        (4, "textures", bytes(&texels, 0)),
+        (6, "environment", bytes(&table.sky, [0.0_f32; 4])),
+    ];
+    rows.extend(moving(table));
+    rows.sort_by_key(|(at, ..)| *at);
+    rows.into_iter()
+        .map(|(_, name, bytes)| (name, bytes))
+        .collect()
 }
 
 fn bytes<T: Pod>(rows: &[T], none: T) -> Vec<u8> {

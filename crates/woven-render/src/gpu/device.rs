@@ -1,5 +1,6 @@
 //! Adapters, the device, waiting for it, and its errors as sentences.
 
+use super::pipeline::BINDINGS;
 use anyhow::{Result, anyhow, bail};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -53,7 +54,7 @@ fn fits(adapter: &wgpu::Adapter) -> bool {
         .get_downlevel_capabilities()
         .flags
         .contains(wgpu::DownlevelFlags::COMPUTE_SHADERS);
-    compute && adapter.limits().max_storage_buffers_per_shader_stage >= 8
+    compute && adapter.limits().max_storage_buffers_per_shader_stage >= BINDINGS
 }
 
 /// What adapters there are.

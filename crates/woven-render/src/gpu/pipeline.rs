@@ -34,6 +34,8 @@ pub fn source() -> String {
 const PASSES: [&str; 3] = ["start", "see", "finish"];
 /// Bindings that the passes only read; two that they write follow.
 const READ_ONLY: u32 = 8;
+/// Storage buffers that a shader binds.
+pub(super) const BINDINGS: u32 = READ_ONLY + 2;
 
 /// The compiled shader.
 pub(super) struct Pipeline {
@@ -59,7 +61,7 @@ impl Pipeline {
             },
             count: None,
         };
-        let entries: Vec<_> = (0..READ_ONLY + 2).map(entry).collect();
+        let entries: Vec<_> = (0..BINDINGS).map(entry).collect();
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("scene"),
             entries: &entries,

@@ -224,7 +224,7 @@ impl Gpu {
         Ok(())
     }
 
-    /// A mesh has moved: uploads the table anew, keeping device and pipeline.
+    /// A mesh has moved: uploads what moves of the table.
     pub(crate) fn moved(&mut self, table: &Table) -> Result<()> {
         self.globals = table.globals;
         self.buffers

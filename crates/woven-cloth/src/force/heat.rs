@@ -88,6 +88,18 @@ mod tests {
     use crate::fabrics::Mechanics;
     use crate::step::{Stepper, stable_step};
 
+    /// Five even waves of two metres of cloth on one of rail.
+    fn waves() -> Pleats {
+        Pleats {
+            width: 1.0,
+            fabric_width: 2.0,
+            pleats: 5.0,
+            heading: crate::rail::Heading::Wave,
+            irregularity: 0.0,
+            seed: 1,
+        }
+    }
+
     #[test]
     fn a_strip_at_ease_on_a_circle_rolls_up_to_it() {
         let m = Mechanics {
@@ -114,14 +126,7 @@ mod tests {
     #[test]
     fn pleats_at_ease_are_those_of_the_heading() {
         let sheet = Sheet::flat(61, 3, 2.0, 0.1, Mechanics::default());
-        let pleats = Pleats {
-            width: 1.0,
-            fabric_width: 2.0,
-            pleats: 5.0,
-            heading: crate::rail::Heading::Wave,
-            irregularity: 0.0,
-            seed: 1,
-        };
+        let pleats = waves();
         assert!(HeatSet::of_pleats(&sheet, &pleats, 0.0).is_none());
         let set = HeatSet::of_pleats(&sheet, &pleats, 0.5).unwrap();
         let row = pleats.row(61, 0.0);
@@ -139,14 +144,7 @@ mod tests {
     #[test]
     fn cloth_wholly_set_has_no_moment_in_its_pleats() {
         let mut sheet = Sheet::flat(61, 5, 2.0, 0.1, Mechanics::default());
-        let pleats = Pleats {
-            width: 1.0,
-            fabric_width: 2.0,
-            pleats: 5.0,
-            heading: crate::rail::Heading::Wave,
-            irregularity: 0.0,
-            seed: 1,
-        };
+        let pleats = waves();
         // As a curtain is hung: the weft along x and z, the warp down.
         for (i, p) in pleats.row(61, 0.0).into_iter().enumerate() {
             for j in 0..5 {

@@ -174,7 +174,10 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<()> {
         if args.render.aov {
             // From the frame before in the cache, whether this run has rendered it or not.
             cache.apply(k.saturating_sub(1), &mut other)?;
-            renderer.move_mesh(moving, &frame.positions, &frame.normals)?;
+            if args.shutter > 0.0 {
+                // The last moment of the shutter is another one.
+                renderer.move_mesh(moving, &frame.positions, &frame.normals)?;
+            }
             film.push("motion", renderer.motion(moving, &other.positions)?);
         }
         setup::finish(&mut film, &args.render, &job.metadata, &hash)?;

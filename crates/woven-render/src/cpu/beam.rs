@@ -102,12 +102,12 @@ impl Beam {
 
     /// Follows all rays to their ends through all gaps: as [`super::bvh::transmittance`], without its coin for faint light.
     pub(super) fn pass(&mut self, table: &Table) {
-        pulp::Arch::new().dispatch(Pass(self, table));
+        pulp::Arch::new().dispatch(Widest::<false>(self, table));
     }
 
     /// Finds what each ray meets first: as [`super::bvh::nearest`].
     pub(super) fn nearest(&mut self, table: &Table) {
-        pulp::Arch::new().dispatch(Nearest(self, table));
+        pulp::Arch::new().dispatch(Widest::<true>(self, table));
     }
 
     /// Every triangle that a group of rays may meet; for the `NEAREST` the nearer boxes first.
@@ -173,27 +173,15 @@ impl Beam {
     }
 }
 
-// Types of their own in place of closures: what calls a closure is not always compiled into the wide copy.
+/// A walk to be compiled for the widest vectors. No closure: what calls a closure is not always compiled into the wide copy.
+struct Widest<'a, const NEAREST: bool>(&'a mut Beam, &'a Table);
 
-struct Pass<'a>(&'a mut Beam, &'a Table);
-
-impl pulp::NullaryFnOnce for Pass<'_> {
+impl<const NEAREST: bool> pulp::NullaryFnOnce for Widest<'_, NEAREST> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
         let Self(beam, table) = self;
-        beam.walk::<false>(table);
-    }
-}
-
-struct Nearest<'a>(&'a mut Beam, &'a Table);
-
-impl pulp::NullaryFnOnce for Nearest<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn call(self) {
-        let Self(beam, table) = self;
-        beam.walk::<true>(table);
+        beam.walk::<NEAREST>(table);
     }
 }
 

@@ -169,7 +169,8 @@ pub(crate) fn nearest(table: &Table, ray: &Ray, tmin: f32, tmax: f32) -> Option<
 /// Share of light that passes straight from the ray's origin to distance `tmax`: the product of the gaps of every
 /// sheet between, in the order in which they are found.
 pub(crate) fn transmittance(table: &Table, ray: &Ray, tmax: f32, rng: &mut Rng) -> f32 {
-    product(table, ray, tmax, FAINT, || rng.coin())
+    let mut aside = rng.aside();
+    product(table, ray, tmax, FAINT, || aside.coin())
 }
 
 /// The same without a coin for faint light: what a beam does for each of its rays.

@@ -182,7 +182,8 @@ pub(crate) fn nearest(table: &Table, ray: &Ray, tmin: f32, tmax: f32) -> Option<
 /// sheet between, in the order in which they are found.
 #[inline(always)]
 pub(crate) fn transmittance(table: &Table, ray: &Ray, tmax: f32, rng: &mut Rng) -> f32 {
-    product(table, ray, tmax, FAINT, || rng.coin())
+    let mut aside = rng.aside();
+    product(table, ray, tmax, FAINT, || aside.coin())
 }
 
 /// The same without a coin for faint light: what a beam does for each of its rays.

@@ -4,10 +4,17 @@
 //! So every pixel of a block takes the light that the second points of all of them scatter (Bekaert, Sbert and Halton
 //! 2002, "Accelerating path tracing by re-using paths"), each weighed by the balance heuristic over all pixels that
 //! could have found it. That is as free of bias as each path alone: the densities that are compared hold the product
-//! of the gaps on the way. Dim points are dropped by a coin, in proportion to what they scatter.
+//! of the gaps on the way. Dim points are dropped by a coin, in proportion to what they scatter: one coin for the block
+//! (systematic resampling), so that their number does not scatter too.
+//!
+//! The paths of all blocks draw from one set of points along a Z-curve over the picture (Ahmed and Wonka 2020,
+//! "Screen-space blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels"): blocks side
+//! by side complete each other, and what a filter takes together has less noise than as many strangers.
 //!
 //! A point is shared on the side of the sheet on which it was found. What scattering found behind a glossy point
 //! belongs to its own path, for another viewer would have looked elsewhere; light that was sampled there is shared.
+
+mod comb;
 
 use glam::Vec3;
 
@@ -17,8 +24,9 @@ use super::camera;
 use super::math::luminance;
 use super::path::{Begun, FIRSTS, First, Sample, Second, View, layer};
 use super::surface;
-use crate::rng::{Rng, hash, hash2};
+use crate::rng::{Rng, hash, hash2, morton, unit};
 use crate::table::{MaterialRow, Table};
+use comb::comb;
 
 /// Side of a block of pixels.
 pub(crate) const BLOCK: u32 = 8;
@@ -120,11 +128,11 @@ impl pulp::NullaryFnOnce for Widest<'_> {
             room,
             out,
         } = self;
-        let here = hash2(
-            (x0 as u32 & 0xffff) | ((y0 as u32) << 16),
-            view.seed ^ PATHS,
-        );
-        let turn = hash2(index, here) % GROUP as u32;
+        let seed = hash2(index, view.seed ^ PATHS);
+        // Where the curve begins is another place each time, so that its seams do not show.
+        let place = |corner: i32, bits: u32| (corner + BLOCK as i32) as u32 / BLOCK + (bits & 31);
+        let order = morton(place(x0, seed), place(y0, seed >> 5));
+        let turn = hash2(order, seed);
         let pixel = |member: usize| {
             let x = u32::try_from(x0 + (member as u32 % BLOCK) as i32).ok()?;
             let y = u32::try_from(y0 + (member as u32 / BLOCK) as i32).ok()?;
@@ -132,19 +140,17 @@ impl pulp::NullaryFnOnce for Widest<'_> {
         };
         let pixels = std::array::from_fn(pixel);
         camera::walk(table, view, &pixels, index, &mut room.beam, &mut room.walks);
-        let mut coins = [0.0; GROUP];
         room.begun.clear();
         for member in 0..GROUP {
             let Some(walk) = &mut room.walks[member] else {
                 room.begun.push(None);
                 continue;
             };
-            let slice = index * GROUP as u32 + (member as u32 ^ turn);
-            let mut paths = Rng::new(0, 0, slice, here);
+            let slice = order * GROUP as u32 + (member as u32 ^ (turn % GROUP as u32));
+            let mut paths = Rng::new(0, 0, slice, seed);
             room.begun.push(Some(walk.follow(table, view, &mut paths)));
-            coins[member] = paths.coin();
         }
-        gather(table, &mut room.begun, &coins, &mut room.beam);
+        gather(table, &mut room.begun, unit(turn), &mut room.beam);
         for (out, begun) in out.iter_mut().zip(&room.begun) {
             if let Some(begun) = begun {
                 *out = begun.sample;
@@ -166,7 +172,7 @@ struct Sight {
 
 /// Distributes the light of all second points over all first points.
 #[inline(always)]
-fn gather(table: &Table, group: &mut [Option<Begun>], coins: &[f32; GROUP], beam: &mut Beam) {
+fn gather(table: &Table, group: &mut [Option<Begun>], coin: f32, beam: &mut Beam) {
     let mut bright = [0.0; GROUP];
     for (bright, begun) in bright.iter_mut().zip(group.iter()) {
         if let Some(y) = begun.as_ref().and_then(|b| b.second.as_ref()) {
@@ -177,9 +183,11 @@ fn gather(table: &Table, group: &mut [Option<Begun>], coins: &[f32; GROUP], beam
     if total <= 0.0 {
         return;
     }
-    for i in 0..GROUP {
-        let q = (KEPT * bright[i] / total).min(1.0);
-        let Some(begun) = group[i].as_ref().filter(|_| coins[i] < q) else {
+    for (i, weight) in comb(&bright, total, coin).into_iter().enumerate() {
+        if weight <= 0.0 {
+            continue;
+        }
+        let Some(begun) = group[i].as_ref() else {
             continue;
         };
         let (Some(own), Some(y)) = (begun.firsts[begun.chosen].as_ref(), begun.second) else {
@@ -225,7 +233,7 @@ fn gather(table: &Table, group: &mut [Option<Begun>], coins: &[f32; GROUP], beam
             for which in 0..FIRSTS {
                 let sight = &sights[which];
                 if sight.density > 0.0 {
-                    shine.add(table, begun, which, sight, sight.carry * (1.0 / (q * all)));
+                    shine.add(table, begun, which, sight, sight.carry * (weight / all));
                 }
             }
         }

@@ -155,6 +155,7 @@ fn nearest(ray: Ray, tmin: f32, tmax: f32) -> Hit {
 // exact one just ends there.
 fn transmittance(ray: Ray, tmax: f32, faint: f32, exact: bool, rng: ptr<function, Rng>) -> f32 {
     var product = 1.0;
+    var aside = rng_aside(rng);
     stack[0] = 0u;
     var top = 1u;
     loop {
@@ -196,7 +197,7 @@ fn transmittance(ray: Ray, tmax: f32, faint: f32, exact: bool, rng: ptr<function
                 if (exact) {
                     return 0.0;
                 }
-                if (rng_coin(rng) < 0.5) {
+                if (rng_coin(&aside) < 0.5) {
                     return 0.0;
                 }
                 product *= 2.0;

@@ -6,6 +6,8 @@
 const BLOCK: u32 = 8u;
 const GROUP: u32 = 64u;
 const KEPT: f32 = 16.0;
+const TOOTH: f32 = 0.01;
+const GOLDEN: f32 = 0.618034;
 const PATHS: u32 = 0x70617468u;
 
 // A point of a sheet, as the passes leave it to each other.
@@ -28,8 +30,6 @@ struct Slot {
     // Of the gaps on the own path's way to its second point, and where the path began.
     passed: f32,
     chosen: u32,
-    // Decides whether the second point is kept.
-    coin: f32,
     // What the second point scatters, about.
     brightness: f32,
     second: SecondRow,
@@ -80,6 +80,21 @@ fn inside(pixel: vec2<i32>) -> bool {
     return all(pixel >= vec2<i32>(0)) && all(pixel < vec2<i32>(vec2<u32>(frame.width, frame.height)));
 }
 
+fn seed_of_paths() -> u32 {
+    return hash2(frame.index, frame.seed ^ PATHS);
+}
+
+// Number of a block on the Z-curve along which the blocks draw from one set of points.
+fn order_of(corner: vec2<i32>) -> u32 {
+    let seed = seed_of_paths();
+    let place = vec2<u32>(corner + i32(BLOCK)) / BLOCK;
+    return morton(place.x + (seed & 31u), place.y + ((seed >> 5u) & 31u));
+}
+
+fn turn_of(order: u32) -> u32 {
+    return hash2(order, seed_of_paths());
+}
+
 @compute @workgroup_size(64, 1, 1)
 fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
     let slot = workgroup.x * GROUP + member;
@@ -92,12 +107,9 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     if (!inside(pixel)) {
         return;
     }
-    let at = bitcast<vec2<u32>>(corner);
-    let here = hash2((at.x & 0xffffu) | (at.y << 16u), frame.seed ^ PATHS);
-    let turn = hash2(frame.index, here) % GROUP;
-    var paths = rng_new(0u, 0u, frame.index * GROUP + (member ^ turn), here);
+    let order = order_of(corner);
+    var paths = rng_new(0u, 0u, order * GROUP + (member ^ (turn_of(order) % GROUP)), seed_of_paths());
     let b = begin(u32(pixel.x), u32(pixel.y), &paths);
-    slots[slot].coin = rng_coin(&paths);
     for (var k = 0u; k < LAYERS; k++) {
         slots[slot].taken.direct[k] = vec4<f32>(b.taken.direct[k], 0.0);
         slots[slot].taken.indirect[k] = vec4<f32>(b.taken.indirect[k], 0.0);
@@ -131,10 +143,43 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     }
 }
 
-// Probability with which the second point of a slot is kept, 0 if it was not.
-fn keeping(slot: u32, total: f32) -> f32 {
-    let q = min(KEPT * slots[slot].brightness / total, 1.0);
-    return select(0.0, q, total > 0.0 && slots[slot].coin < q);
+// A comb for each row of second points laid side by side, each as long as it is bright; see cpu/share.rs.
+struct Comb {
+    total: f32,
+    coin: f32,
+    start: f32,
+    sum: f32,
+    before: f32,
+}
+
+fn under_teeth(x: f32) -> f32 {
+    return floor(x) * TOOTH + min(x - floor(x), TOOTH);
+}
+
+fn comb_of(block: u32, base: u32) -> Comb {
+    let coin = to_unit(turn_of(order_of(corner_of(frame.block + block))));
+    return Comb(total_of(base), coin, 0.0, 0.0, 0.0);
+}
+
+// Weight of the next point, that of a slot; 0 if it is not kept.
+fn keeping(comb: ptr<function, Comb>, slot: u32) -> f32 {
+    let bright = slots[slot].brightness;
+    let total = (*comb).total;
+    if (total <= 0.0) {
+        return 0.0;
+    }
+    if (slot % BLOCK == 0u) {
+        let turned = (*comb).coin + GOLDEN * f32(slot / BLOCK % BLOCK);
+        (*comb).start = turned - floor(turned);
+        (*comb).before = under_teeth((*comb).start);
+        (*comb).sum = 0.0;
+    }
+    (*comb).sum += bright;
+    let now = under_teeth(KEPT * (*comb).sum / total + (*comb).start);
+    let teeth = (now - (*comb).before) / TOOTH;
+    (*comb).before = now;
+    let length = KEPT * bright / total;
+    return select(0.0, select(1.0, teeth / length, length < 1.0), teeth > 0.0);
 }
 
 fn total_of(base: u32) -> f32 {
@@ -167,13 +212,13 @@ fn surface_of(point: Point) -> Surface {
 fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
     let base = workgroup.x * GROUP;
     let slot = base + member;
-    let total = total_of(base);
+    var comb = comb_of(workgroup.x, base);
     // No coin is tossed on the way.
     var unused = Rng(0u, 0u, 0u);
     var n = 0u;
     for (var k = 0u; k < GROUP; k++) {
         let i = base + k;
-        if (keeping(i, total) <= 0.0) {
+        if (keeping(&comb, i) <= 0.0) {
             continue;
         }
         for (var which = 0u; which < FIRSTS; which++) {
@@ -225,7 +270,7 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     }
     let base = workgroup.x * GROUP;
     let slot = base + member;
-    let total = total_of(base);
+    var comb = comb_of(workgroup.x, base);
     var light: array<vec3<f32>, LAYERS>;
     for (var k = 0u; k < LAYERS; k++) {
         light[k] = slots[slot].taken.indirect[k].xyz;
@@ -233,8 +278,8 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     var n = 0u;
     for (var m = 0u; m < GROUP; m++) {
         let i = base + m;
-        let q = keeping(i, total);
-        if (q <= 0.0) {
+        let weight = keeping(&comb, i);
+        if (weight <= 0.0) {
             continue;
         }
         for (var which = 0u; which < FIRSTS; which++) {
@@ -246,7 +291,7 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
             for (var k = 0u; k < GROUP; k++) {
                 all_densities += slots[base + k].sights[n][0].w + slots[base + k].sights[n][1].w;
             }
-            let carry = sight.xyz * (1.0 / (q * all_densities));
+            let carry = sight.xyz * (weight / all_densities);
             let s = surface_of(slots[i].second.point);
             let x = surface_of(slots[slot].firsts[which].point);
             let to = s.p - leave(x, s.p - x.p);

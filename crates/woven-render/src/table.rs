@@ -315,3 +315,6 @@ fn turned(normals: &[Vec3], corners: [u32; 3], e1: Vec3, e2: Vec3, uvs: [Vec2; 3
         ..Shade::default()
     }
 }
+
+#[cfg(test)]
+mod tests;

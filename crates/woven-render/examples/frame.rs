@@ -93,7 +93,7 @@ fn main() -> Result<()> {
     let mut done: Vec<(Integrator, String, Film)> = Vec::new();
     for (what, integrator, counts) in [
         ("direct", Integrator::Direct, vec![2, 4]),
-        ("everything", Integrator::Path, vec![1, 2, 4]),
+        ("everything", Integrator::Path, vec![1, 2, 3, 4]),
     ] {
         for spp in counts {
             let settings = Settings {

@@ -11,7 +11,7 @@
 use super::creases::hold_open;
 use super::guard::{Step, keep_apart};
 use super::net::{Grid, Net};
-use super::patches::Patches;
+use super::patches::{Patches, Touch};
 use crate::sheet::{Field, Sheet};
 use crate::work::widest;
 
@@ -97,13 +97,10 @@ impl SelfContact {
                 before,
             };
             // Pairs are chosen by where they were, so that it does not matter when they were listed.
-            for &[a, b] in &self.patches.touch[at] {
+            for &Touch { a, b, near } in &self.patches.touch[at] {
                 let (a, b) = (a as usize, b as usize);
                 let d = between(before, a, b);
-                if dot(d, d) < reach * reach
-                    && inv_mass[a] + inv_mass[b] > 0.0
-                    && net.may_meet(a, b, dot(d, d))
-                {
+                if dot(d, d) < near && inv_mass[a] + inv_mass[b] > 0.0 {
                     self.over(net, x, [a, b], hp);
                     self.over(net, x, [b, a], hp);
                 }
@@ -159,7 +156,9 @@ impl SelfContact {
                     before[2][b] - p[2],
                 ];
                 if dot(d, d) < reach2 && (pair.a != pair.b || a < b) && net.apart_on_cloth(a, b) {
-                    touch.push([a as u32, b as u32]);
+                    let near = net.meet_within(a, b).min(patches.cap * patches.cap);
+                    let (a, b) = (a as u32, b as u32);
+                    touch.push(Touch { a, b, near });
                 }
             });
         });

@@ -15,6 +15,7 @@ use super::net::Net;
 use super::patches::{Pair, Patches};
 use super::tiles::Look;
 use crate::sheet::Field;
+use crate::work::widest;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -90,7 +91,10 @@ fn look(patches: &mut Patches, before: &Field, x: &Field, parallel: bool) -> Vec
             cap: far,
             near: (pair.motion / 0.89).max(CLOSE),
         };
-        pair.slack = a.look(b, pair.a == pair.b, &look, &mut found);
+        pair.slack = widest(
+            #[inline(always)]
+            || a.look(b, pair.a == pair.b, &look, &mut found),
+        );
         found
     };
     if parallel && due.len() > 16 {

@@ -62,16 +62,16 @@ impl Net<'_> {
         (a % g.nx).abs_diff(b % g.nx) > 1 || (a / g.nx).abs_diff(b / g.nx) > 1
     }
 
-    /// Whether two vertices whose squared distance is `d2` belong to different folds: neighbours on the cloth meet only in a sharp crease.
+    /// The squared distance, m², below which two vertices that are not corners of one cell belong to different folds: neighbours on the
+    /// cloth meet only in a sharp crease.
     #[inline(always)]
-    pub(crate) fn may_meet(&self, a: usize, b: usize, d2: f64) -> bool {
+    pub(crate) fn meet_within(&self, a: usize, b: usize) -> f64 {
         let g = self.grid(a);
         if b < g.first || b >= g.first + g.nx * g.ny {
-            return true;
+            return f64::INFINITY;
         }
         let (a, b) = (a - g.first, b - g.first);
         let (di, dj) = ((a % g.nx).abs_diff(b % g.nx), (a / g.nx).abs_diff(b / g.nx));
-        let on_cloth2 = (di as f64 * g.hx).powi(2) + (dj as f64 * g.hy).powi(2);
-        (di > 1 || dj > 1) && d2 < 0.81 * on_cloth2
+        0.81 * ((di as f64 * g.hx).powi(2) + (dj as f64 * g.hy).powi(2))
     }
 }

@@ -20,6 +20,14 @@ pub(crate) struct Pair {
     pub(crate) budget: f64,
 }
 
+/// Two vertices that may come near, and the squared distance, m², below which they push each other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Touch {
+    pub(crate) a: u32,
+    pub(crate) b: u32,
+    pub(crate) near: f64,
+}
+
 /// The patches of all grids and the pairs that are near.
 #[derive(Clone, Debug)]
 pub(crate) struct Patches {
@@ -27,7 +35,7 @@ pub(crate) struct Patches {
     pub(crate) tiles: Vec<Tile>,
     pub(crate) pairs: Vec<Pair>,
     /// For every pair the vertices, one of each patch, that are or may come near.
-    pub(crate) touch: Vec<Vec<[u32; 2]>>,
+    pub(crate) touch: Vec<Vec<Touch>>,
     /// Distances are told apart up to here, m.
     pub(crate) cap: f64,
     motions: Vec<Motion>,

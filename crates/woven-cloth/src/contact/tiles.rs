@@ -215,6 +215,7 @@ impl Tile {
 
     /// The distance at `before` of what does not share a vertex, at most the cap; things that may meet on the way to `now` or are
     /// very near go to `found`.
+    #[inline(always)]
     pub(crate) fn look(&self, other: &Self, same: bool, look: &Look, found: &mut Vec<Near>) -> f64 {
         let (mut mine, mut m) = self.cells(look.grids, look.before);
         let (mut theirs, mut n) = other.cells(look.grids, look.before);

@@ -209,10 +209,10 @@ pub(super) fn walk(
 ) {
     walks.clear();
     for pixel in pixels {
-        walks.push(match *pixel {
-            None => None,
-            Some((x, y)) => Some(Walk::new(view, x, y, index)),
-        });
+        walks.push(None);
+        if let (Some((x, y)), Some(walk)) = (*pixel, walks.last_mut()) {
+            *walk = Some(Walk::new(view, x, y, index));
+        }
     }
     for crossing in 0..CROSSINGS {
         beam.clear();

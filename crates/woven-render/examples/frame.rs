@@ -1,5 +1,6 @@
 //! What a frame of a moving curtain costs and how clean it is: the moving of the mesh with its ray structure, the
-//! sampling, the filter, in wall and CPU seconds, then FLIP against a frame of many samples, and memory.
+//! sampling, the filter, in CPU seconds, with the most memory that was held meanwhile; then, when all frames are done, FLIP
+//! against a frame of many samples.
 //!
 //! `cargo run --release -p woven-render --example frame -- SCENE.glb [MESH] [WIDTHxHEIGHT] [FRAMES] [CONVERGED_SPP]`
 
@@ -8,7 +9,7 @@ mod process;
 
 use anyhow::{Context, Result};
 use glam::Vec3;
-use process::{cpu_seconds, peak_memory};
+use process::{cpu_seconds, forget_peak, peak_memory, scheduled_seconds};
 use std::path::Path;
 use std::time::Instant;
 use woven_render::compare::{Picture, compare};
@@ -82,30 +83,26 @@ fn main() -> Result<()> {
         let normals = normals(&positions, &mesh.indices);
         (positions, normals)
     };
+    let base = Settings {
+        width: width.parse()?,
+        height: height.parse()?,
+        depth: 7,
+        ..Settings::default()
+    };
+    // All frames first, so that no picture of many samples lies beside them in memory.
+    let mut done: Vec<(Integrator, String, Film)> = Vec::new();
     for (what, integrator, counts) in [
         ("direct", Integrator::Direct, vec![2, 4]),
         ("everything", Integrator::Path, vec![1, 2, 4]),
     ] {
-        let settings = Settings {
-            width: width.parse()?,
-            height: height.parse()?,
-            spp: converged,
-            seed: 77,
-            depth: 7,
-            integrator,
-            ..Settings::default()
-        };
-        let mut reference = Renderer::new(&scene, &settings, Backend::Cpu)?;
-        reference.move_mesh(moving, &last.0, &last.1)?;
-        reference.finish(&mut ())?;
-        let reference = reference.film()?;
         for spp in counts {
             let settings = Settings {
                 spp,
-                seed: 0,
                 aov: integrator == Integrator::Path,
-                ..settings
+                integrator,
+                ..base
             };
+            forget_peak();
             let mut renderer = Renderer::new(&scene, &settings, Backend::Cpu)?;
             let (mut update, mut sampling, mut filter) = (0.0, 0.0, 0.0);
             let (began, wall) = (cpu_seconds(), Instant::now());
@@ -113,19 +110,19 @@ fn main() -> Result<()> {
             for k in 0..frames {
                 let positions = swayed(&mesh.positions, k);
                 let normals = normals(&positions, &mesh.indices);
-                let at = Instant::now();
+                let at = scheduled_seconds();
                 renderer.move_mesh(moving, &positions, &normals)?;
-                update += at.elapsed().as_secs_f64();
-                let at = Instant::now();
+                let moved = scheduled_seconds();
                 renderer.finish(&mut ())?;
-                sampling += at.elapsed().as_secs_f64();
                 let mut picture = renderer.film()?;
-                let at = Instant::now();
+                let sampled = scheduled_seconds();
                 // Direct light is clean enough without.
                 if integrator == Integrator::Path {
                     denoise(&mut picture, &denoise::Settings::default());
                 }
-                filter += at.elapsed().as_secs_f64();
+                update += moved - at;
+                sampling += sampled - moved;
+                filter += scheduled_seconds() - sampled;
                 film = Some(picture);
             }
             let each = f64::from(frames);
@@ -133,14 +130,36 @@ fn main() -> Result<()> {
                 (cpu_seconds() - began) / each,
                 wall.elapsed().as_secs_f64() / each,
             );
-            let [hdr, ldr] = flip(&film.context("no frame")?, &reference)?;
-            println!(
-                "{what}, {spp} spp: {cpu:.2} CPU-s and {wall:.2} s a frame (update {:.1} %, sampling {:.1} %, filter {:.1} %), mean FLIP {hdr:.4} (HDR), {ldr:.4} (LDR) against {converged} spp, {:.0} MiB",
-                100.0 * update / each / wall,
-                100.0 * sampling / each / wall,
-                100.0 * filter / each / wall,
+            let sum = update + sampling + filter;
+            let film = film.context("no frame")?;
+            let beauty = film.beauty().context("a picture")?.to_vec();
+            let line = format!(
+                "{what}, {spp} spp: {cpu:.2} CPU-s and {wall:.2} s a frame (update {:.1} ms of processor time, {:.1} %; sampling {:.1} %, filter {:.1} %), at most {:.0} MiB",
+                1e3 * update / each,
+                100.0 * update / sum,
+                100.0 * sampling / sum,
+                100.0 * filter / sum,
                 peak_memory()
             );
+            println!("{line}");
+            let film = Film::of_beauty(film.width, film.height, beauty);
+            done.push((integrator, format!("{what}, {spp} spp"), film));
+        }
+    }
+    for integrator in [Integrator::Direct, Integrator::Path] {
+        let settings = Settings {
+            spp: converged,
+            seed: 77,
+            integrator,
+            ..base
+        };
+        let mut reference = Renderer::new(&scene, &settings, Backend::Cpu)?;
+        reference.move_mesh(moving, &last.0, &last.1)?;
+        reference.finish(&mut ())?;
+        let reference = reference.film()?;
+        for (_, what, film) in done.iter().filter(|d| d.0 == integrator) {
+            let [hdr, ldr] = flip(film, &reference)?;
+            println!("{what}: mean FLIP {hdr:.4} (HDR), {ldr:.4} (LDR) against {converged} spp");
         }
     }
     Ok(())

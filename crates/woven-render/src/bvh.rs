@@ -137,16 +137,14 @@ impl Bvh {
         if child & LEAF != 0 {
             return leaves[(child & !LEAF) as usize];
         }
+        // A child that is not there takes nothing away and adds nothing.
         let node = &self.nodes[child as usize];
-        let side = |v: &[Vec4; 3], lane: usize| Vec3A::new(v[0][lane], v[1][lane], v[2][lane]);
-        (0..4)
-            .filter(|&lane| node.child[lane] != EMPTY)
-            .fold(Aabb::INVALID, |b, lane| {
-                b.union(&Aabb {
-                    min: side(&node.lo, lane),
-                    max: side(&node.hi, lane),
-                })
-            })
+        let [x, y, z] = node.lo.map(Vec4::min_element);
+        let [u, v, w] = node.hi.map(Vec4::max_element);
+        Aabb {
+            min: Vec3A::new(x, y, z),
+            max: Vec3A::new(u, v, w),
+        }
     }
 
     /// Most entries of the stack that a walk can need.

@@ -16,17 +16,19 @@ mod tree;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::accumulate::Accumulation;
+use crate::accumulate::{Accumulation, PixelSum};
 use crate::table::Table;
-use path::View;
-use share::BLOCK;
+use path::{Sample, View};
+use share::{BLOCK, GROUP, Room};
 
 /// Adds `count` samples to every pixel; false when `stop` was set meanwhile: then only those that every pixel has got
 /// are added. Each pixel's samples are added one by one in their order, so that neither threads nor steps change a bit.
+/// The first sample takes the place of what is there. `fresh` is room to work in.
 pub(crate) fn step(
     table: &Table,
     view: &View,
     sums: &mut Accumulation,
+    fresh: &mut Vec<Sample>,
     count: u32,
     stop: &AtomicBool,
 ) -> bool {
@@ -34,23 +36,29 @@ pub(crate) fn step(
         let (left, above) = share::shift(index);
         let columns = (view.width + left).div_ceil(BLOCK);
         let rows = (view.height + above).div_ceil(BLOCK);
-        let blocks: Vec<_> = (0..columns * rows)
-            .into_par_iter()
-            .map(|block| {
-                if stop.load(Ordering::Relaxed) {
-                    return Vec::new();
-                }
-                let x = (block % columns * BLOCK) as i32 - left as i32;
-                let y = (block / columns * BLOCK) as i32 - above as i32;
-                share::block(table, view, x, y, index)
-            })
-            .collect();
+        fresh.resize(columns as usize * rows as usize * GROUP, Sample::default());
+        let blocks = fresh.par_chunks_exact_mut(GROUP).enumerate();
+        blocks.for_each_init(Room::new, |room, (block, out)| {
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
+            let block = block as u32;
+            let x = (block % columns * BLOCK) as i32 - left as i32;
+            let y = (block / columns * BLOCK) as i32 - above as i32;
+            share::block(table, view, x, y, index, room, out);
+        });
         if stop.load(Ordering::Relaxed) {
             return false;
         }
-        for (pixel, sample) in blocks.iter().flatten() {
-            sums.pixels[*pixel].add(sample);
-        }
+        let lines = sums.pixels.par_chunks_exact_mut(view.width as usize);
+        lines.enumerate().for_each(|(y, line)| {
+            for (x, sum) in line.iter_mut().enumerate() {
+                if index == 0 {
+                    *sum = PixelSum::default();
+                }
+                sum.add(&fresh[share::find(x as u32, y as u32, index, columns)]);
+            }
+        });
         sums.samples += 1;
     }
     true

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::accumulate::Accumulation;
+use crate::accumulate::{Accumulation, PixelSum};
 use crate::cpu;
 use crate::cpu::path::View;
 use crate::film::Film;
@@ -120,6 +120,8 @@ pub struct Renderer {
     /// Complete for the CPU; for the GPU the state of the last read-back.
     sums: Accumulation,
     engine: Engine,
+    /// Room for one sample of every pixel.
+    fresh: Vec<cpu::path::Sample>,
     /// The mesh that moves while samples are gathered.
     shutter: Option<Shutter>,
     note: Option<String>,
@@ -180,6 +182,7 @@ impl Renderer {
             settings: *settings,
             sums,
             engine,
+            fresh: Vec::new(),
             shutter: None,
             note,
             half: None,
@@ -277,7 +280,10 @@ impl Renderer {
             }
             let whole = match &mut self.engine {
                 Engine::Gpu(gpu) => gpu.step(&view, count, stop)?,
-                Engine::Cpu => cpu::step(&self.table, &view, &mut self.sums, count, stop),
+                Engine::Cpu => {
+                    let (sums, fresh) = (&mut self.sums, &mut self.fresh);
+                    cpu::step(&self.table, &view, sums, fresh, count, stop)
+                }
             };
             if !whole {
                 break;
@@ -434,6 +440,10 @@ impl Renderer {
 
     fn read_back(&mut self) -> Result<()> {
         let Engine::Gpu(gpu) = &mut self.engine else {
+            // Without a sample there may be sums of before, see `clear`.
+            if self.sums.samples == 0 {
+                self.sums.pixels.fill(PixelSum::default());
+            }
             return Ok(());
         };
         let Err(why) = gpu.read(&mut self.sums) else {
@@ -473,6 +483,12 @@ impl Renderer {
     /// # Errors
     /// When the GPU does not answer.
     pub fn clear(&mut self) -> Result<()> {
+        if let Engine::Cpu = self.engine {
+            // The first sample takes the place of these sums.
+            self.sums.samples = 0;
+            (self.half, self.noise) = (None, None);
+            return Ok(());
+        }
         self.resume(Accumulation::new(self.settings.width, self.settings.height))
     }
 

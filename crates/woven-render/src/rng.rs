@@ -102,6 +102,20 @@ pub fn unit(x: u32) -> f32 {
     (x >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// Number of the place (x, y) on a Z-curve: their 16 low bits in turn (Morton 1966).
+#[inline(always)]
+#[must_use]
+pub fn morton(x: u32, y: u32) -> u32 {
+    let spread = |x: u32| {
+        let x = x & 0xffff;
+        let x = (x | (x << 8)) & 0x00ff_00ff;
+        let x = (x | (x << 4)) & 0x0f0f_0f0f;
+        let x = (x | (x << 2)) & 0x3333_3333;
+        (x | (x << 1)) & 0x5555_5555
+    };
+    spread(x) | (spread(y) << 1)
+}
+
 /// The random numbers of one sample of one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Rng {
@@ -140,6 +154,17 @@ impl Rng {
             unit(scramble(a[2] ^ b[2], s1 ^ 0x68e3_1da4)),
             unit(scramble(a[3] ^ b[3], s2 ^ 0x1b56_c4e9)),
         ]
+    }
+
+    /// For decisions whose number depends on rounding (a ray that grazes a sheet): they change nothing of what follows.
+    #[inline(always)]
+    #[must_use]
+    pub fn aside(&mut self) -> Self {
+        self.coin();
+        Self {
+            state: hash(self.state),
+            ..*self
+        }
     }
 
     /// The next independent number in 0..1, for decisions of which a sample takes an unknown number.

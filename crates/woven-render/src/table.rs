@@ -12,7 +12,7 @@ mod sky;
 mod tree;
 
 use anyhow::{Result, bail, ensure};
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::bvh::{Bvh, Corners, EMPTY, STACK};
@@ -102,12 +102,12 @@ impl Table {
             sky: Vec::new(),
             globals: Globals::default(),
             camera: scene.camera,
-            meshes: scene.meshes.clone(),
+            meshes: scene.meshes.iter().map(with_unit_normals).collect(),
             corners,
             owners,
             first,
         };
-        table.fill_shade(None);
+        table.fill_shade();
         table.fill_colors(scene);
         table.fill_gaps();
         sky::fill(&mut table, scene, light_layers);
@@ -139,13 +139,18 @@ impl Table {
         self.fits(mesh, positions, normals)?;
         let old = &mut self.meshes[mesh];
         old.positions.copy_from_slice(positions);
-        old.normals = normals.to_vec();
-        for (t, triangle) in old.indices.iter().enumerate() {
-            self.corners[self.first[mesh] + t] = triangle.map(|i| positions[i as usize]);
+        old.normals.clear();
+        old.normals.extend(normals.iter().map(unit));
+        let corners = &mut self.corners[self.first[mesh]..];
+        for (corners, triangle) in corners.iter_mut().zip(&old.indices) {
+            *corners = triangle.map(|i| positions[i as usize]);
         }
         self.bvh.refit(&self.corners);
-        self.fill_shade(Some(mesh));
-        lights::moved(self);
+        self.renew_shade(mesh);
+        // Lights stay where they are when a mesh without light moves.
+        if self.materials[self.meshes[mesh].material].flags & EMITS != 0 {
+            lights::moved(self);
+        }
         Ok(())
     }
 
@@ -177,8 +182,8 @@ impl Table {
         Ok(())
     }
 
-    /// Fills the rows of one mesh, or all.
-    fn fill_shade(&mut self, only: Option<usize>) {
+    /// Fills all rows but their lights and colours.
+    fn fill_shade(&mut self) {
         let (owners, meshes) = (&self.owners, &self.meshes);
         let rows = self.shade.par_iter_mut().zip(&self.bvh.order);
         rows.for_each(|(row, &i)| {
@@ -186,14 +191,35 @@ impl Table {
                 return;
             }
             let (m, t) = owners[i as usize];
-            if only.is_none_or(|o| o == m as usize) {
-                *row = Shade {
-                    light: row.light,
-                    colors: row.colors,
-                    mesh: m,
-                    triangle: t,
-                    ..shade_row(&meshes[m as usize], t as usize)
-                };
+            *row = Shade {
+                mesh: m,
+                triangle: t,
+                ..shade_row(&meshes[m as usize], t as usize)
+            };
+        });
+    }
+
+    /// Renews in the rows of a mesh what changes when it moves, from the edges in the ray structure.
+    fn renew_shade(&mut self, mesh: usize) {
+        let moved = &self.meshes[mesh];
+        let rows = self.shade.par_chunks_exact_mut(4).zip(&self.bvh.packets);
+        rows.with_min_len(256).for_each(|(rows, packet)| {
+            for (lane, row) in rows.iter_mut().enumerate() {
+                if row.mesh as usize == mesh && row.material != NONE {
+                    let edge = |e: &[Vec4; 3]| Vec3::new(e[0][lane], e[1][lane], e[2][lane]);
+                    let corners = moved.indices[row.triangle as usize];
+                    let uvs =
+                        [0, 1, 2].map(|k| Vec2::new([row.n0, row.n1, row.n2][k][3], row.v[k]));
+                    let turned = turned(
+                        &moved.normals,
+                        corners,
+                        edge(&packet.e1),
+                        edge(&packet.e2),
+                        uvs,
+                    );
+                    (row.n0, row.n1, row.n2) = (turned.n0, turned.n1, turned.n2);
+                    (row.weft, row.v) = (turned.weft, turned.v);
+                }
             }
         });
     }
@@ -229,31 +255,55 @@ impl Table {
     }
 }
 
+/// Normals of length 1; 0 stands for one that cannot be had, then the triangle's own is taken.
+fn unit(normal: &Vec3) -> Vec3 {
+    normal.try_normalize().unwrap_or(Vec3::ZERO)
+}
+
+fn with_unit_normals(mesh: &Mesh) -> Mesh {
+    Mesh {
+        name: mesh.name.clone(),
+        positions: mesh.positions.clone(),
+        normals: mesh.normals.iter().map(unit).collect(),
+        uvs: mesh.uvs.clone(),
+        indices: mesh.indices.clone(),
+        ..*mesh
+    }
+}
+
 fn shade_row(mesh: &Mesh, t: usize) -> Shade {
-    let [a, b, c] = mesh.indices[t].map(|i| i as usize);
-    let (p0, e1, e2) = (
-        mesh.positions[a],
-        mesh.positions[b] - mesh.positions[a],
-        mesh.positions[c] - mesh.positions[a],
-    );
-    let flat = e1.cross(e2).try_normalize().unwrap_or(Vec3::Y);
-    debug_assert!(p0.is_finite());
-    let normal = |i: usize| {
-        mesh.normals
-            .get(i)
-            .and_then(|n| n.try_normalize())
-            .unwrap_or(flat)
+    let corners = mesh.indices[t];
+    let [a, b, c] = corners.map(|i| mesh.positions[i as usize]);
+    debug_assert!(a.is_finite());
+    let uv = |i: u32| mesh.uvs.get(i as usize).copied().unwrap_or(Vec2::ZERO);
+    Shade {
+        colors: [0; 4],
+        material: mesh.material as u32,
+        light: NONE,
+        mesh: 0,
+        triangle: t as u32,
+        ..turned(&mesh.normals, corners, b - a, c - a, corners.map(uv))
+    }
+}
+
+/// Normals, weft and texture coordinates of a triangle with the edges `e1` and `e2` from its first corner.
+#[inline(always)]
+fn turned(normals: &[Vec3], corners: [u32; 3], e1: Vec3, e2: Vec3, uvs: [Vec2; 3]) -> Shade {
+    let cross = e1.cross(e2);
+    let flat = || cross.try_normalize().unwrap_or(Vec3::Y);
+    let normal = |i: u32| {
+        let known = normals.get(i as usize).copied();
+        known.filter(|n| *n != Vec3::ZERO).unwrap_or_else(flat)
     };
-    let uv = |i: usize| mesh.uvs.get(i).copied().unwrap_or(Vec2::ZERO);
-    let (n0, n1, n2) = (normal(a), normal(b), normal(c));
-    let (t0, t1, t2) = (uv(a), uv(b), uv(c));
+    let [n0, n1, n2] = corners.map(normal);
+    let [t0, t1, t2] = uvs;
     let (d1, d2) = (t1 - t0, t2 - t0);
     let det = d1.x * d2.y - d1.y * d2.x;
     // dp/du from the texture coordinates; without them the weft runs horizontally.
     let weft = ((e1 * d2.y - e2 * d1.y) * det.signum())
         .try_normalize()
         .filter(|_| det.abs() > 1e-20)
-        .or_else(|| Vec3::Y.cross(flat).try_normalize())
+        .or_else(|| Vec3::Y.cross(flat()).try_normalize())
         .unwrap_or(Vec3::X);
     Shade {
         n0: n0.extend(t0.x).into(),
@@ -261,16 +311,10 @@ fn shade_row(mesh: &Mesh, t: usize) -> Shade {
         n2: n2.extend(t2.x).into(),
         // With v running down in the picture, a picture seen the right way round has a negative determinant.
         weft: weft.extend(if det > 0.0 { -1.0 } else { 1.0 }).into(),
-        v: [
-            t0.y,
-            t1.y,
-            t2.y,
-            det.abs() / e1.cross(e2).length().max(1e-20),
-        ],
-        colors: [0; 4],
-        material: mesh.material as u32,
-        light: NONE,
-        mesh: 0,
-        triangle: t as u32,
+        v: [t0.y, t1.y, t2.y, det.abs() / cross.length().max(1e-20)],
+        ..Shade::default()
     }
 }
+
+#[cfg(test)]
+mod tests;

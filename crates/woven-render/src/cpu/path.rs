@@ -119,6 +119,7 @@ pub(super) struct Begun {
     pub second: Option<Second>,
 }
 
+#[inline(always)]
 pub(super) fn towards_eye(s: &Surface, d: Vec3) -> Vec3 {
     if s.frame[2].dot(d) > 0.0 {
         -s.frame[2]
@@ -127,6 +128,7 @@ pub(super) fn towards_eye(s: &Surface, d: Vec3) -> Vec3 {
     }
 }
 
+#[inline(always)]
 pub(super) fn place(table: &Table, m: &MaterialRow, s: &Surface, d: Vec3) -> Place {
     light::place(table, s.p, towards_eye(s, d), m.flags & TRANSMITS != 0)
 }
@@ -188,6 +190,7 @@ impl Unseen {
 
 /// Samples a light for a place that is seen from `wo` (in the sheet's frame); nothing where what is scattered towards
 /// `wo` is black.
+#[inline(always)]
 pub(super) fn incident(
     table: &Table,
     m: &MaterialRow,
@@ -223,6 +226,7 @@ pub(super) fn add(light: &mut [Vec3; LAYERS], layer: u32, value: Vec3) {
 
 /// Follows the path that scatters at `first` until it ends. What it meets without a second scattering is added to
 /// `own`, and so is what comes through the second point if only this very path may use it; the rest is returned.
+#[inline(always)]
 pub(super) fn follow(
     table: &Table,
     view: &View,
@@ -331,10 +335,13 @@ pub(super) fn follow(
         let at = place(table, m, &s, d);
         let wo = s.local(-d);
         let u = rng.set(2 * bounce + 1);
-        let lit = incident(table, m, &s, &at, wo, u).map(|l| {
-            let passed = transmittance(table, &l.ray, l.end, rng);
-            l.pass(passed)
-        });
+        let lit = match incident(table, m, &s, &at, wo, u) {
+            None => None,
+            Some(l) => {
+                let passed = transmittance(table, &l.ray, l.end, rng);
+                Some(l.pass(passed))
+            }
+        };
         // What is scattered here is the yarn's share; the coin above has already chosen the yarn.
         let yarn = 1.0 / (1.0 - gap).max(1e-6);
         v.throughput *= yarn;

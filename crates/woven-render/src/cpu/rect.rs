@@ -4,10 +4,10 @@
 //! is too small for single precision, and for parallelograms, evenly over the area. What can only be seen through a
 //! window is sampled on the [`Part`] that shows there.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use std::f32::consts::TAU;
 
-use super::math::{acos, sincos};
+use super::math::{acos4, sincos};
 use crate::table::LightRow;
 
 /// Solid angles below this are sampled by area: four angles of some 2π in single precision carry an error of about
@@ -50,6 +50,7 @@ impl Part {
 
 /// What shows of a rectangle from `p` through a window at most: the corners of the window cast on its plane, and the
 /// smallest part around them. Everything, unless the rectangle lies behind the window.
+#[inline(always)]
 pub(crate) fn part(r: &LightRow, window: &LightRow, p: Vec3) -> Option<Part> {
     let n = Vec3::from(r.n);
     let (u, v) = (Vec3::from(r.u), Vec3::from(r.v));
@@ -61,26 +62,31 @@ pub(crate) fn part(r: &LightRow, window: &LightRow, p: Vec3) -> Option<Part> {
         return None;
     }
     let height = (Vec3::from(r.p) - p).dot(n);
-    let mut low = Vec2::splat(f32::INFINITY);
-    let mut high = Vec2::splat(f32::NEG_INFINITY);
-    for corner in 0..4 {
-        let mut d = Vec3::from(window.p) - p;
-        if corner & 1 != 0 {
-            d += Vec3::from(window.u);
-        }
-        if corner & 2 != 0 {
-            d += Vec3::from(window.v);
-        }
-        // A ray past the corner that misses the plane, or runs along it: all of it may show.
-        let along = d.dot(n);
-        if along * height <= 1e-3 * height * height {
-            return Some(WHOLE);
-        }
-        let q = p + d * (height / along) - Vec3::from(r.p);
-        let at = Vec2::new(q.dot(u) / u.length_squared(), q.dot(v) / v.length_squared());
-        low = low.min(at);
-        high = high.max(at);
+    // The four corners side by side.
+    let corner = Vec3::from(window.p) - p;
+    let (wu, wv) = (Vec3::from(window.u), Vec3::from(window.v));
+    let d: [Vec4; 3] = std::array::from_fn(|k| {
+        Vec4::splat(corner[k])
+            + Vec4::new(0.0, wu[k], 0.0, wu[k])
+            + Vec4::new(0.0, 0.0, wv[k], wv[k])
+    });
+    let dot = |a: &[Vec4; 3], b: Vec3| a[0] * b.x + a[1] * b.y + a[2] * b.z;
+    let along = dot(&d, n);
+    // A ray past the corner that misses the plane, or runs along it: all of it may show.
+    if (along * height)
+        .cmple(Vec4::splat(1e-3 * height * height))
+        .any()
+    {
+        return Some(WHOLE);
     }
+    let far = height / along;
+    let q: [Vec4; 3] = std::array::from_fn(|k| Vec4::splat(p[k]) + d[k] * far - r.p[k]);
+    let (x, y) = (
+        dot(&q, u) / u.length_squared(),
+        dot(&q, v) / v.length_squared(),
+    );
+    let low = Vec2::new(x.min_element(), y.min_element());
+    let high = Vec2::new(x.max_element(), y.max_element());
     Some(Part {
         low: low.clamp(Vec2::ZERO, Vec2::ONE),
         high: high.clamp(Vec2::ZERO, Vec2::ONE),
@@ -105,6 +111,7 @@ struct Spherical {
     solid_angle: f32,
 }
 
+#[inline(always)]
 fn spherical(r: &LightRow, part: &Part, p: Vec3) -> Spherical {
     let (u, v) = (Vec3::from(r.u), Vec3::from(r.v));
     let (lu, lv) = (u.length(), v.length());
@@ -124,12 +131,7 @@ fn spherical(r: &LightRow, part: &Part, p: Vec3) -> Spherical {
     let n1 = x1 / (z2 + x1 * x1).sqrt();
     let n2 = y1 / (z2 + y1 * y1).sqrt();
     let n3 = -x0 / (z2 + x0 * x0).sqrt();
-    let (g0, g1, g2, g3) = (
-        acos(-n0 * n1),
-        acos(-n1 * n2),
-        acos(-n2 * n3),
-        acos(-n3 * n0),
-    );
+    let [g0, g1, g2, g3] = acos4(Vec4::new(-n0 * n1, -n1 * n2, -n2 * n3, -n3 * n0)).into();
     let k = TAU - g2 - g3;
     Spherical {
         x,
@@ -148,6 +150,7 @@ fn spherical(r: &LightRow, part: &Part, p: Vec3) -> Spherical {
 }
 
 /// A direction from `p` to the rectangle, its distance, and the density per solid angle (0: none).
+#[inline(always)]
 pub(crate) fn sample(r: &LightRow, part: &Part, p: Vec3, u: f32, v: f32) -> (Vec3, f32, f32) {
     if r.area > 0.0 {
         let s = spherical(r, part, p);

@@ -4,10 +4,17 @@
 //! So every pixel of a block takes the light that the second points of all of them scatter (Bekaert, Sbert and Halton
 //! 2002, "Accelerating path tracing by re-using paths"), each weighed by the balance heuristic over all pixels that
 //! could have found it. That is as free of bias as each path alone: the densities that are compared hold the product
-//! of the gaps on the way. Dim points are dropped by a coin, in proportion to what they scatter.
+//! of the gaps on the way. Dim points are dropped by a coin, in proportion to what they scatter: one coin for the block
+//! (systematic resampling), so that their number does not scatter too.
+//!
+//! The paths of all blocks draw from one set of points along a Z-curve over the picture (Ahmed and Wonka 2020,
+//! "Screen-space blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels"): blocks side
+//! by side complete each other, and what a filter takes together has less noise than as many strangers.
 //!
 //! A point is shared on the side of the sheet on which it was found. What scattering found behind a glossy point
 //! belongs to its own path, for another viewer would have looked elsewhere; light that was sampled there is shared.
+
+mod comb;
 
 use glam::Vec3;
 
@@ -17,8 +24,9 @@ use super::camera;
 use super::math::luminance;
 use super::path::{Begun, FIRSTS, First, Sample, Second, View, layer};
 use super::surface;
-use crate::rng::{Rng, hash, hash2};
-use crate::table::Table;
+use crate::rng::{Rng, hash, hash2, morton, unit};
+use crate::table::{MaterialRow, Table};
+use comb::comb;
 
 /// Side of a block of pixels.
 pub(crate) const BLOCK: u32 = 8;
@@ -37,7 +45,47 @@ pub(crate) fn shift(index: u32) -> (u32, u32) {
     (h % BLOCK, h / BLOCK % BLOCK)
 }
 
-/// Sample `index` of those pixels of the block at (x0, y0) that lie in the picture, with their places in it. Their
+/// The pixels of a block in tiles of four by two, so that rays side by side have much in common.
+pub(super) const TILES: [usize; GROUP] = tiles();
+
+const fn tiles() -> [usize; GROUP] {
+    let mut order = [0; GROUP];
+    let mut i = 0;
+    while i < GROUP {
+        let (tile, within) = (i / 8, i % 8);
+        let (x, y) = (tile % 2 * 4 + within % 4, tile / 2 * 2 + within / 4);
+        order[i] = y * BLOCK as usize + x;
+        i += 1;
+    }
+    order
+}
+
+/// Room to work in, kept from block to block.
+pub(crate) struct Room {
+    beam: Beam,
+    walks: Vec<Option<camera::Walk>>,
+    begun: Vec<Option<Begun>>,
+}
+
+impl Room {
+    pub(crate) fn new() -> Self {
+        Self {
+            beam: Beam::new(),
+            walks: Vec::with_capacity(GROUP),
+            begun: Vec::with_capacity(GROUP),
+        }
+    }
+}
+
+/// Place in its block (blocks row by row, `columns` a row; then row by row in it) of pixel (x, y) for sample `index`.
+pub(crate) fn find(x: u32, y: u32, index: u32, columns: u32) -> usize {
+    let (left, above) = shift(index);
+    let (x, y) = (x + left, y + above);
+    let block = y / BLOCK * columns + x / BLOCK;
+    (block as usize) * GROUP + (y % BLOCK * BLOCK + x % BLOCK) as usize
+}
+
+/// Sample `index` of those pixels of the block at (x0, y0) that lie in the picture, one a pixel of the block. Their
 /// paths draw from one set of points, a slice each, another one each time.
 pub(super) fn block(
     table: &Table,
@@ -45,36 +93,70 @@ pub(super) fn block(
     x0: i32,
     y0: i32,
     index: u32,
-) -> Vec<(usize, Sample)> {
-    let here = hash2(
-        (x0 as u32 & 0xffff) | ((y0 as u32) << 16),
-        view.seed ^ PATHS,
-    );
-    let turn = hash2(index, here) % GROUP as u32;
-    let pixel = |member: usize| {
-        let x = u32::try_from(x0 + (member as u32 % BLOCK) as i32).ok()?;
-        let y = u32::try_from(y0 + (member as u32 / BLOCK) as i32).ok()?;
-        (x < view.width && y < view.height).then_some((x, y))
-    };
-    let pixels = std::array::from_fn(pixel);
-    let mut beam = Beam::new();
-    let mut walks = camera::walk(table, view, &pixels, index, &mut beam);
-    let mut coins = [0.0; GROUP];
-    let mut group: [Option<Begun>; GROUP] = std::array::from_fn(|member| {
-        let walk = walks[member].take()?;
-        let slice = index * GROUP as u32 + (member as u32 ^ turn);
-        let mut paths = Rng::new(0, 0, slice, here);
-        let begun = walk.follow(table, view, &mut paths);
-        coins[member] = paths.coin();
-        Some(begun)
+    room: &mut Room,
+    out: &mut [Sample],
+) {
+    pulp::Arch::new().dispatch(Widest {
+        table,
+        view,
+        corner: (x0, y0),
+        index,
+        room,
+        out,
     });
-    gather(table, &mut group, &coins, &mut beam);
-    let place = |(x, y): (u32, u32)| (y * view.width + x) as usize;
-    group
-        .into_iter()
-        .enumerate()
-        .filter_map(|(member, begun)| Some((place(pixels[member]?), begun?.sample)))
-        .collect()
+}
+
+/// A block to be compiled for the widest vectors: everything in it that takes time is compiled in.
+struct Widest<'a> {
+    table: &'a Table,
+    view: &'a View,
+    corner: (i32, i32),
+    index: u32,
+    room: &'a mut Room,
+    out: &'a mut [Sample],
+}
+
+impl pulp::NullaryFnOnce for Widest<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let Self {
+            table,
+            view,
+            corner: (x0, y0),
+            index,
+            room,
+            out,
+        } = self;
+        let seed = hash2(index, view.seed ^ PATHS);
+        // Where the curve begins is another place each time, so that its seams do not show.
+        let place = |corner: i32, bits: u32| (corner + BLOCK as i32) as u32 / BLOCK + (bits & 31);
+        let order = morton(place(x0, seed), place(y0, seed >> 5));
+        let turn = hash2(order, seed);
+        let pixel = |member: usize| {
+            let x = u32::try_from(x0 + (member as u32 % BLOCK) as i32).ok()?;
+            let y = u32::try_from(y0 + (member as u32 / BLOCK) as i32).ok()?;
+            (x < view.width && y < view.height).then_some((x, y))
+        };
+        let pixels = std::array::from_fn(pixel);
+        camera::walk(table, view, &pixels, index, &mut room.beam, &mut room.walks);
+        room.begun.clear();
+        for member in 0..GROUP {
+            let Some(walk) = &mut room.walks[member] else {
+                room.begun.push(None);
+                continue;
+            };
+            let slice = order * GROUP as u32 + (member as u32 ^ (turn % GROUP as u32));
+            let mut paths = Rng::new(0, 0, slice, seed);
+            room.begun.push(Some(walk.follow(table, view, &mut paths)));
+        }
+        gather(table, &mut room.begun, unit(turn), &mut room.beam);
+        for (out, begun) in out.iter_mut().zip(&room.begun) {
+            if let Some(begun) = begun {
+                *out = begun.sample;
+            }
+        }
+    }
 }
 
 /// How a pixel sees the second point of another.
@@ -89,26 +171,26 @@ struct Sight {
 }
 
 /// Distributes the light of all second points over all first points.
-fn gather(
-    table: &Table,
-    group: &mut [Option<Begun>; GROUP],
-    coins: &[f32; GROUP],
-    beam: &mut Beam,
-) {
-    let bright: [f32; GROUP] = std::array::from_fn(|i| {
-        let second = group[i].as_ref().and_then(|b| b.second.as_ref());
-        second.map_or(0.0, |y| brightness(table, y))
-    });
+#[inline(always)]
+fn gather(table: &Table, group: &mut [Option<Begun>], coin: f32, beam: &mut Beam) {
+    let mut bright = [0.0; GROUP];
+    for (bright, begun) in bright.iter_mut().zip(group.iter()) {
+        if let Some(y) = begun.as_ref().and_then(|b| b.second.as_ref()) {
+            *bright = brightness(table, y);
+        }
+    }
     let total: f32 = bright.iter().sum();
     if total <= 0.0 {
         return;
     }
-    for i in 0..GROUP {
-        let q = (KEPT * bright[i] / total).min(1.0);
-        let Some(begun) = group[i].as_ref().filter(|_| coins[i] < q) else {
+    for (i, weight) in comb(&bright, total, coin).into_iter().enumerate() {
+        if weight <= 0.0 {
+            continue;
+        }
+        let Some(begun) = group[i].as_ref() else {
             continue;
         };
-        let (Some(own), Some(y)) = (begun.firsts[begun.chosen], begun.second) else {
+        let (Some(own), Some(y)) = (begun.firsts[begun.chosen].as_ref(), begun.second) else {
             continue;
         };
         let chosen = begun.chosen;
@@ -118,9 +200,11 @@ fn gather(
         let mut rays = [(0, 0, 0.0); MOST];
         beam.clear();
         for which in 0..FIRSTS {
-            for k in 0..GROUP {
-                let first = group[k].as_ref().and_then(|b| b.firsts[which].as_ref());
-                let Some(look) = first.and_then(|f| look(table, f, &y, side)) else {
+            for &k in &TILES {
+                let Some(first) = group[k].as_ref().and_then(|b| b.firsts[which].as_ref()) else {
+                    continue;
+                };
+                let Some(look) = look(table, first, &y, side) else {
                     continue;
                 };
                 sights[k][which] = look.sight;
@@ -138,27 +222,69 @@ fn gather(
         }
         let all: f32 = sights.iter().flatten().map(|s| s.density).sum();
         let m = &table.materials[y.s.material as usize];
+        let shine = Shine {
+            y: &y,
+            m,
+            sides: surface::even(m)
+                .then(|| [Vec3::Z, -Vec3::Z].map(|wo| scattered(table, m, &y, wo))),
+        };
         for (sights, begun) in sights.iter().zip(group.iter_mut()) {
             let Some(begun) = begun else { continue };
-            for (which, sight) in sights.iter().enumerate().filter(|s| s.1.density > 0.0) {
-                // By event all that comes this way is of one layer.
-                let event =
-                    begun.firsts[which].map_or(0, |x| x.vertex.event(x.vertex.s.local(sight.d)));
-                let into = |light: usize| layer(table, event, light as u32) as usize;
-                let carry = sight.carry * (1.0 / (q * all));
-                let wo = y.s.local(-sight.d);
-                let light = &mut begun.sample.indirect;
-                light[into(y.lit.layer as usize)] += y.lit.scattered(table, m, &y.s, wo) * carry;
-                let f = surface::evaluate(table, m, &y.s, y.s.local(y.wi), wo) * carry;
-                for (k, &beyond) in y.beyond.iter().enumerate() {
-                    light[into(k)] += f * beyond;
+            for which in 0..FIRSTS {
+                let sight = &sights[which];
+                if sight.density > 0.0 {
+                    shine.add(table, begun, which, sight, sight.carry * (weight / all));
                 }
             }
         }
     }
 }
 
+/// The light that a second point scatters.
+struct Shine<'a> {
+    y: &'a Second,
+    m: &'a MaterialRow,
+    /// See [`scattered`]; for a viewer in front and behind, where it is the same in all directions of a side.
+    sides: Option<[(Vec3, Vec3); 2]>,
+}
+
+/// What is scattered of the sampled light, and the value for where the path went on to, towards `wo`.
+#[inline(always)]
+fn scattered(table: &Table, m: &MaterialRow, y: &Second, wo: Vec3) -> (Vec3, Vec3) {
+    (
+        y.lit.scattered(table, m, &y.s, wo),
+        surface::evaluate(table, m, &y.s, y.s.local(y.wi), wo),
+    )
+}
+
+impl Shine<'_> {
+    /// Adds the share `carry` of it to what the pixel sees by way of `sight`.
+    #[inline(always)]
+    fn add(&self, table: &Table, begun: &mut Begun, which: usize, sight: &Sight, carry: Vec3) {
+        let y = self.y;
+        let (lit, f) = match &self.sides {
+            Some(sides) => sides[usize::from(sight.d.dot(y.s.frame[2]) > 0.0)],
+            None => scattered(table, self.m, y, y.s.local(-sight.d)),
+        };
+        // By event all that comes this way is of one layer.
+        let event = match &begun.firsts[which] {
+            Some(x) if table.globals.events != 0 => x.vertex.event(x.vertex.s.local(sight.d)),
+            _ => 0,
+        };
+        let into = |light: usize| layer(table, event, light as u32) as usize;
+        let light = &mut begun.sample.indirect;
+        light[into(y.lit.layer as usize)] += lit * carry;
+        let f = f * carry;
+        for (k, &beyond) in y.beyond.iter().enumerate() {
+            if beyond != Vec3::ZERO {
+                light[into(k)] += f * beyond;
+            }
+        }
+    }
+}
+
 /// About what the point scatters.
+#[inline(always)]
 fn brightness(table: &Table, y: &Second) -> f32 {
     let all = y.beyond.iter().fold(y.lit.light, |sum, &b| sum + b);
     let l = luminance(all) * table.materials[y.s.material as usize].emission[3];
@@ -185,6 +311,7 @@ impl Sight {
     }
 }
 
+#[inline(always)]
 fn look(table: &Table, first: &First, y: &Second, side: bool) -> Option<Look> {
     let x = &first.vertex;
     let from = x.s.leave(table, y.s.p - x.s.p);

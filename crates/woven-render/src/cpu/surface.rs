@@ -123,6 +123,7 @@ fn bent([x, y, z]: [Vec3; 3], hand: f32, scale: f32, c: [f32; 4]) -> [Vec3; 3] {
 }
 
 /// Everything about the hit that scattering needs; textures are averaged over a square of side `wide` \[m\].
+#[inline(always)]
 pub(crate) fn surface(table: &Table, hit: &Hit, wide: f32) -> Surface {
     let place = hit.place as usize;
     let packet = &table.bvh.packets[place / 4];
@@ -377,7 +378,7 @@ pub(crate) fn evaluate(table: &Table, m: &MaterialRow, s: &Surface, wi: Vec3, wo
     let k = |j: usize| Vec3::new(m.linear[j][0], m.linear[j][1], m.linear[j][2]);
     let back = side(wo);
     let scale = s.tint * s.alpha;
-    if m.flags & (MATT | EVEN) == MATT | EVEN {
+    if even(m) {
         let j = if wi.z * wo.z < 0.0 { 0 } else { 2 + back };
         return k(j) * scale * (m.cover * FRAC_1_PI);
     }
@@ -435,6 +436,12 @@ fn closed(mut shape: [f32; crate::scene::MAX_SHAPE]) -> [f32; crate::scene::MAX_
     shape[GAMMA_WARP] = 1.0;
     shape[INV_MEAN_COVER] = 1.0;
     shape
+}
+
+/// What is scattered to one side is the same in all its directions.
+#[inline(always)]
+pub(crate) fn even(m: &MaterialRow) -> bool {
+    m.flags & (MATT | EVEN) == MATT | EVEN
 }
 
 /// Density of [`sample`].

@@ -192,6 +192,7 @@ fn nearest(ray: Ray, tmin: f32, tmax: f32) -> Hit {
 // exact one just ends there.
 fn transmittance(ray: Ray, tmax: f32, faint: f32, exact: bool, rng: ptr<function, Rng>) -> f32 {
     var product = 1.0;
+    var aside = rng_aside(rng);
     var child = 0u;
     var top = 0u;
     var packet = 0u;
@@ -257,7 +258,7 @@ fn transmittance(ray: Ray, tmax: f32, faint: f32, exact: bool, rng: ptr<function
             if (product <= 0.0 || exact) {
                 return 0.0;
             }
-            if (rng_coin(rng) < 0.5) {
+            if (rng_coin(&aside) < 0.5) {
                 return 0.0;
             }
             product *= 2.0;

@@ -36,10 +36,21 @@ fn to_unit(x: u32) -> f32 {
     return f32(x >> 8u) * (1.0 / 16777216.0);
 }
 
+fn spread(a: u32) -> u32 {
+    var x = a & 0xffffu;
+    x = (x | (x << 8u)) & 0x00ff00ffu;
+    x = (x | (x << 4u)) & 0x0f0f0f0fu;
+    x = (x | (x << 2u)) & 0x33333333u;
+    return (x | (x << 1u)) & 0x55555555u;
+}
+
+fn morton(x: u32, y: u32) -> u32 {
+    return spread(x) | (spread(y) << 1u);
+}
+
 fn rng_new(x: u32, y: u32, index: u32, seed: u32) -> Rng {
     let s = hash2(hash2(x | (y << 16u), seed), index / PERIOD);
-    let i = index % PERIOD;
-    return Rng(s, i, hash2(s, i ^ 0x5bd1e995u));
+    return Rng(s, index % PERIOD, hash2(s, index ^ 0x5bd1e995u));
 }
 
 fn rng_set(rng: ptr<function, Rng>, number: u32) -> vec4<f32> {
@@ -54,6 +65,11 @@ fn rng_set(rng: ptr<function, Rng>, number: u32) -> vec4<f32> {
         to_unit(scramble(p.z, s1 ^ 0x68e31da4u)),
         to_unit(scramble(p.w, s2 ^ 0x1b56c4e9u)),
     );
+}
+
+fn rng_aside(rng: ptr<function, Rng>) -> Rng {
+    _ = rng_coin(rng);
+    return Rng((*rng).seed, (*rng).index, hash((*rng).state));
 }
 
 fn rng_coin(rng: ptr<function, Rng>) -> f32 {

@@ -6,6 +6,8 @@
 const BLOCK: u32 = 8u;
 const GROUP: u32 = 64u;
 const KEPT: f32 = 16.0;
+const TOOTH: f32 = 0.01;
+const GOLDEN: f32 = 0.618034;
 const PATHS: u32 = 0x70617468u;
 
 // A point of a sheet, as the passes leave it to each other.
@@ -28,14 +30,12 @@ struct Slot {
     // Of the gaps on the own path's way to its second point, and where the path began.
     passed: f32,
     chosen: u32,
-    // Decides whether the second point is kept.
-    coin: f32,
     // What the second point scatters, about.
     brightness: f32,
-    // Of the second point that is kept as the n-th, in slot n of the block: its pixel, its probability, and with how much
+    // Of the second point that is kept as the n-th, in slot n of the block: its pixel, its weight, and with how much
     // density all pixels of the block see it.
     kept: u32,
-    q: f32,
+    weight: f32,
     densities: f32,
     // How many are kept; in the block's first slot.
     count: u32,
@@ -103,6 +103,21 @@ fn inside(pixel: vec2<i32>) -> bool {
     return all(pixel >= vec2<i32>(0)) && all(pixel < vec2<i32>(vec2<u32>(frame.width, frame.height)));
 }
 
+fn seed_of_paths() -> u32 {
+    return hash2(frame.index, frame.seed ^ PATHS);
+}
+
+// Number of a block on the Z-curve along which the blocks draw from one set of points.
+fn order_of(corner: vec2<i32>) -> u32 {
+    let seed = seed_of_paths();
+    let place = vec2<u32>(corner + i32(BLOCK)) / BLOCK;
+    return morton(place.x + (seed & 31u), place.y + ((seed >> 5u) & 31u));
+}
+
+fn turn_of(order: u32) -> u32 {
+    return hash2(order, seed_of_paths());
+}
+
 @compute @workgroup_size(64, 1, 1)
 fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let member = member_of(lane);
@@ -116,12 +131,9 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     if (!inside(pixel)) {
         return;
     }
-    let at = bitcast<vec2<u32>>(corner);
-    let here = hash2((at.x & 0xffffu) | (at.y << 16u), frame.seed ^ PATHS);
-    let turn = hash2(frame.index, here) % GROUP;
-    var paths = rng_new(0u, 0u, frame.index * GROUP + (member ^ turn), here);
+    let order = order_of(corner);
+    var paths = rng_new(0u, 0u, order * GROUP + (member ^ (turn_of(order) % GROUP)), seed_of_paths());
     let b = begin(u32(pixel.x), u32(pixel.y), &paths);
-    slots[slot].coin = rng_coin(&paths);
     for (var k = 0u; k < LAYERS; k++) {
         slots[slot].taken.direct[k] = vec4<f32>(b.taken.direct[k], 0.0);
         slots[slot].taken.indirect[k] = vec4<f32>(b.taken.indirect[k], 0.0);
@@ -164,10 +176,47 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     }
 }
 
-// Probability with which the second point of a slot is kept, 0 if it was not.
-fn keeping(slot: u32, total: f32) -> f32 {
-    let q = min(KEPT * slots[slot].brightness / total, 1.0);
-    return select(0.0, q, total > 0.0 && slots[slot].coin < q);
+// A comb for each row of second points laid side by side, each as long as it is bright; see cpu/share.rs.
+struct Comb {
+    total: f32,
+    coin: f32,
+    start: f32,
+    sum: f32,
+    before: f32,
+}
+
+fn under_teeth(x: f32) -> f32 {
+    return floor(x) * TOOTH + min(x - floor(x), TOOTH);
+}
+
+fn comb_of(block: u32, base: u32) -> Comb {
+    let coin = to_unit(turn_of(order_of(corner_of(frame.block + block))));
+    var total = 0.0;
+    for (var k = 0u; k < GROUP; k++) {
+        total += slots[base + k].brightness;
+    }
+    return Comb(total, coin, 0.0, 0.0, 0.0);
+}
+
+// Weight of the next point, that of a slot; 0 if it is not kept.
+fn keeping(comb: ptr<function, Comb>, slot: u32) -> f32 {
+    let bright = slots[slot].brightness;
+    let total = (*comb).total;
+    if (total <= 0.0) {
+        return 0.0;
+    }
+    if (slot % BLOCK == 0u) {
+        let turned = (*comb).coin + GOLDEN * f32(slot / BLOCK % BLOCK);
+        (*comb).start = turned - floor(turned);
+        (*comb).before = under_teeth((*comb).start);
+        (*comb).sum = 0.0;
+    }
+    (*comb).sum += bright;
+    let now = under_teeth(KEPT * (*comb).sum / total + (*comb).start);
+    let teeth = (now - (*comb).before) / TOOTH;
+    (*comb).before = now;
+    let length = KEPT * bright / total;
+    return select(0.0, select(1.0, teeth / length, length < 1.0), teeth > 0.0);
 }
 
 // One lane a block.
@@ -177,16 +226,13 @@ fn keep(@builtin(global_invocation_id) id: vec3<u32>) {
     if (base >= arrayLength(&slots)) {
         return;
     }
-    var total = 0.0;
-    for (var k = 0u; k < GROUP; k++) {
-        total += slots[base + k].brightness;
-    }
+    var comb = comb_of(id.x, base);
     var n = 0u;
     for (var k = 0u; k < GROUP; k++) {
-        let q = keeping(base + k, total);
-        if (q > 0.0) {
+        let weight = keeping(&comb, base + k);
+        if (weight > 0.0) {
             slots[base + n].kept = k;
-            slots[base + n].q = q;
+            slots[base + n].weight = weight;
             n += 1u;
         }
     }
@@ -321,7 +367,7 @@ fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
         let which = at % FIRSTS;
         at += 1u;
         let i = base + slots[base + n].kept;
-        let carry = slots[slot].sights[n][which].xyz * (1.0 / (slots[base + n].q * slots[base + n].densities));
+        let carry = slots[slot].sights[n][which].xyz * (slots[base + n].weight / slots[base + n].densities);
         let s = surface_of_look(i);
         let x = surface_of(slots[slot].firsts[which].point);
         let to = s.p - leave(x, s.p - x.p);

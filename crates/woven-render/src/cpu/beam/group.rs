@@ -14,6 +14,40 @@ pub(super) struct Lanes(pub [f32; LANES]);
 
 impl Lanes {
     pub(super) const ZERO: Self = Self([0.0; LANES]);
+
+    /// The lesser of both in each of the first lanes.
+    #[inline(always)]
+    pub(super) fn least(&mut self, other: &Self, lanes: usize) {
+        for i in 0..lanes {
+            self.0[i] = lesser(self.0[i], other.0[i]);
+        }
+    }
+
+    /// The greater of both in each of the first lanes.
+    #[inline(always)]
+    pub(super) fn most(&mut self, other: &Self, lanes: usize) {
+        for i in 0..lanes {
+            self.0[i] = greater(self.0[i], other.0[i]);
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn lowest(&self) -> f32 {
+        let mut all = self.0[0];
+        for i in 1..LANES {
+            all = lesser(all, self.0[i]);
+        }
+        all
+    }
+
+    #[inline(always)]
+    pub(super) fn highest(&self) -> f32 {
+        let mut all = self.0[0];
+        for i in 1..LANES {
+            all = greater(all, self.0[i]);
+        }
+        all
+    }
 }
 
 /// As the processor's own instruction: no care is taken of what is not a number.
@@ -50,6 +84,16 @@ struct Met {
     t: Lanes,
     u: Lanes,
     v: Lanes,
+    /// Some ray meets it.
+    any: bool,
+}
+
+/// Which way all rays of a beam go along an axis.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    Up,
+    Down,
+    Both,
 }
 
 /// Farther than anything.
@@ -70,15 +114,27 @@ impl Group {
 
     /// Whether some ray meets the box of lane `k` of the node, which holds something.
     #[inline(always)]
-    pub(super) fn meets(&self, node: &Node, k: usize) -> bool {
+    pub(super) fn meets(&self, node: &Node, k: usize, ways: &[Way; 3]) -> bool {
         let (mut near, mut far) = (self.begin, self.end);
         for axis in 0..3 {
             let (lo, hi) = (node.lo[axis][k], node.hi[axis][k]);
             let (o, inv) = (&self.o[axis].0, &self.inv[axis].0);
-            for i in 0..LANES {
-                let (a, b) = ((lo - o[i]) * inv[i], (hi - o[i]) * inv[i]);
-                near.0[i] = greater(near.0[i], lesser(a, b));
-                far.0[i] = lesser(far.0[i], greater(a, b));
+            if ways[axis] == Way::Both {
+                for i in 0..LANES {
+                    let (a, b) = ((lo - o[i]) * inv[i], (hi - o[i]) * inv[i]);
+                    near.0[i] = greater(near.0[i], lesser(a, b));
+                    far.0[i] = lesser(far.0[i], greater(a, b));
+                }
+            } else {
+                let (enter, leave) = if ways[axis] == Way::Up {
+                    (lo, hi)
+                } else {
+                    (hi, lo)
+                };
+                for i in 0..LANES {
+                    near.0[i] = greater(near.0[i], (enter - o[i]) * inv[i]);
+                    far.0[i] = lesser(far.0[i], (leave - o[i]) * inv[i]);
+                }
             }
         }
         let mut any = false;
@@ -100,6 +156,7 @@ impl Group {
             t: Lanes::ZERO,
             u: Lanes::ZERO,
             v: Lanes::ZERO,
+            any: false,
         };
         for i in 0..LANES {
             let (dx, dy, dz) = (dx.0[i], dy.0[i], dz.0[i]);
@@ -122,6 +179,9 @@ impl Group {
             met.u.0[i] = u;
             met.v.0[i] = v;
         }
+        for i in 0..LANES {
+            met.any |= met.t.0[i] < NOWHERE;
+        }
         met
     }
 
@@ -129,6 +189,9 @@ impl Group {
     #[inline(always)]
     pub(super) fn keep(&mut self, leaf: &Packet, packet: u32, k: usize) {
         let met = self.triangle(leaf, k);
+        if !met.any {
+            return;
+        }
         for i in 0..LANES {
             let here = met.t.0[i] < self.end.0[i];
             self.end.0[i] = if here { met.t.0[i] } else { self.end.0[i] };
@@ -146,6 +209,9 @@ impl Group {
     #[inline(always)]
     pub(super) fn pass(&mut self, table: &Table, leaf: &Packet, packet: u32, k: usize) {
         let met = self.triangle(leaf, k);
+        if !met.any {
+            return;
+        }
         let mut gaps = Lanes([leaf.gap[k]; LANES]);
         if leaf.gap[k] < 0.0 {
             for i in 0..LANES {
@@ -180,6 +246,20 @@ pub(super) struct Hull {
 }
 
 impl Hull {
+    /// The way of the rays along each axis.
+    #[inline(always)]
+    pub(super) fn ways(&self) -> [Way; 3] {
+        std::array::from_fn(|axis| {
+            if self.inv[0][axis] > 0.0 {
+                Way::Up
+            } else if self.inv[1][axis] < 0.0 {
+                Way::Down
+            } else {
+                Way::Both
+            }
+        })
+    }
+
     /// About where the rays enter the boxes, never too late, and bits of the boxes that some ray might meet; an axis along which rays go
     /// both ways tells nothing.
     #[inline(always)]

@@ -3,12 +3,15 @@
 
 mod buffers;
 mod device;
+mod forks;
 mod kernel;
 mod pipeline;
+mod rows;
 
 pub use device::{Adapter, adapters};
+pub use forks::Fork;
 pub use kernel::Kernel;
-pub use pipeline::source;
+pub use pipeline::{Traits, source};
 
 use anyhow::{Result, bail, ensure};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,23 +23,26 @@ use crate::cpu::path::View;
 use crate::cpu::share::{BLOCK, shift};
 use crate::table::Table;
 use buffers::{Buffers, range};
-pub use buffers::{Frame, SLOT};
+pub use buffers::{Frame, SECOND, SLOT};
 use device::Device;
 use pipeline::Pipeline;
 
 /// A submit should take about this long: short beside a desktop's watchdog and its screen, long beside the cost of a
 /// submit.
 const AIM: Duration = Duration::from_millis(50);
+/// The same on a software adapter, which other programs keep waiting.
+const AIM_SOFTWARE: Duration = Duration::from_millis(20);
 /// No submit should take longer.
 const LIMIT: Duration = Duration::from_millis(200);
 /// A device that does not answer for this long is lost. Long, for lavapipe compiles a shader at its first use, which takes
 /// half a minute where other programs run.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// A device and the compiled shader: made once in a process and shared, for compiling takes seconds.
+/// A device and the compiled shaders: made once in a process and shared, for compiling takes seconds.
 struct Context {
     device: Device,
-    pipeline: Pipeline,
+    /// By what they are made for.
+    pipelines: Mutex<Vec<(Traits, Arc<Pipeline>)>>,
 }
 
 /// The contexts so far: without and with software adapters.
@@ -53,16 +59,34 @@ impl Context {
             return Ok(context);
         }
         let device = Device::open(software)?;
-        let pipeline = device.guarded("compiling the shader", || Pipeline::new(&device.device))?;
-        let context = Arc::new(Self { device, pipeline });
+        let pipelines = Mutex::default();
+        let context = Arc::new(Self { device, pipelines });
         *slot = Some(Arc::clone(&context));
         Ok(context)
+    }
+
+    /// The shader for a scene.
+    fn pipeline(&self, table: &Table) -> Result<Arc<Pipeline>> {
+        let traits = Traits::of(table, self.device.software);
+        let mut pipelines = self
+            .pipelines
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, found)) = pipelines.iter().find(|(t, _)| *t == traits) {
+            return Ok(Arc::clone(found));
+        }
+        let made = self.device.guarded("compiling the shader", || {
+            Arc::new(Pipeline::new(&self.device.device, traits))
+        })?;
+        pipelines.push((traits, Arc::clone(&made)));
+        Ok(made)
     }
 }
 
 /// A device with a scene on it.
 pub(crate) struct Gpu {
     context: Arc<Context>,
+    pipeline: Arc<Pipeline>,
     buffers: Buffers,
     globals: crate::table::Globals,
     samples: u32,
@@ -70,6 +94,8 @@ pub(crate) struct Gpu {
     height: u32,
     /// Pixel samples that one submit is given now, in blocks of 64.
     load: u32,
+    /// Seconds that a block of them takes at most, of late.
+    cost: f64,
     /// The longest submit so far.
     longest: Duration,
     /// Submits so far.
@@ -80,18 +106,26 @@ impl Gpu {
     /// Sets up a device, compiles the shader and uploads the scene. Without `software`, a software adapter is no GPU.
     pub(crate) fn new(table: &Table, view: &View, software: bool) -> Result<Self> {
         let context = Context::shared(software)?;
-        let buffers = Buffers::new(&context.device, &context.pipeline, table, view)?;
-        Ok(Self {
+        let pipeline = context.pipeline(table)?;
+        let buffers = Buffers::new(&context.device, &pipeline, table, view)?;
+        let new = Self {
             context,
+            pipeline,
             buffers,
             globals: table.globals,
             samples: 0,
             width: view.width,
             height: view.height,
-            load: 16,
+            load: 4,
+            cost: 0.0,
             longest: Duration::ZERO,
             submits: 0,
-        })
+        };
+        // lavapipe compiles a shader when it is first run, even over nothing.
+        let frame = Frame::new(view, &new.globals, 0, 0);
+        let sent = new.submit(&frame, 0);
+        new.wait(Some(sent))?;
+        Ok(new)
     }
 
     pub(crate) fn name(&self) -> &str {
@@ -167,31 +201,41 @@ impl Gpu {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
             label: Some("samples"),
         });
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some("path"),
-                timestamp_writes: None,
-            });
-            pass.set_bind_group(0, &self.buffers.group, &[]);
-            for pipeline in &self.context.pipeline.passes {
-                pass.set_pipeline(pipeline);
-                pass.dispatch_workgroups(groups, 1, 1);
-            }
-        }
+        let (first, others) = self.pipeline.passes.split_at(1);
+        self.pass(&mut encoder, first, groups);
+        self.buffers.copy(&mut encoder, groups);
+        self.pass(&mut encoder, others, groups);
         queue.submit([encoder.finish()])
+    }
+
+    fn pass(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        pipelines: &[(wgpu::ComputePipeline, u32)],
+        groups: u32,
+    ) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_bind_group(0, &self.buffers.group, &[]);
+        for (pipeline, blocks) in pipelines {
+            pass.set_pipeline(pipeline);
+            pass.dispatch_workgroups(groups.div_ceil(*blocks), 1, 1);
+        }
     }
 
     /// Sizes the next submit by the time of the last.
     fn adapt(&mut self, took: Duration, load: u32) {
         self.longest = self.longest.max(took);
         self.submits += 1;
-        let ratio = AIM.as_secs_f64() / took.as_secs_f64().max(1e-5);
-        self.load = if took > LIMIT {
-            (load / 2).max(1)
+        let aim = if self.context.device.software {
+            AIM_SOFTWARE
         } else {
-            // At most twice as much at once: neighbouring parts of a picture differ in cost.
-            ((f64::from(load) * ratio.min(2.0)) as u32).clamp(1, 1 << 24)
+            AIM
         };
+        // Neighbouring parts of a picture differ in cost: the dear ones are forgotten slowly, and the load at most doubled.
+        let seconds = took.as_secs_f64().max(1e-5);
+        self.cost = (0.9 * self.cost).max(seconds / f64::from(load));
+        let most = if took > LIMIT { load / 2 } else { load * 2 };
+        self.load = ((aim.as_secs_f64() / self.cost) as u32).clamp(1, most.clamp(1, 1 << 24));
     }
 
     /// Puts sums on the device, to go on from them.
@@ -227,7 +271,8 @@ impl Gpu {
     /// A mesh has moved: uploads what moves of the table.
     pub(crate) fn moved(&mut self, table: &Table) -> Result<()> {
         self.globals = table.globals;
+        self.pipeline = self.context.pipeline(table)?;
         self.buffers
-            .update(&self.context.device, &self.context.pipeline, table)
+            .update(&self.context.device, &self.pipeline, table)
     }
 }

@@ -4,8 +4,8 @@ use std::mem::{offset_of, size_of};
 
 use naga::{Module, TypeInner};
 use woven_render::accumulate::PixelSum;
-use woven_render::bvh::{Node, Packet};
-use woven_render::gpu::{Frame, SLOT, source};
+use woven_render::bvh::Packet;
+use woven_render::gpu::{Fork, Frame, SECOND, SLOT, Traits, source};
 use woven_render::table::{Globals, LightRow, MaterialRow, Shade, TextureRow};
 
 /// Name, offset of each member, and the size of a struct of the shader.
@@ -36,18 +36,52 @@ macro_rules! same {
     }};
 }
 
-#[test]
-fn rows_lie_where_the_shader_reads_them() {
-    let text = source();
-    let module = naga::front::wgsl::parse_str(&text)
-        .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
+fn valid(text: &str) -> Module {
+    let module =
+        naga::front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
     let flags = naga::valid::ValidationFlags::all();
     naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
         .validate(&module)
-        .expect("a valid shader");
+        .unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
+    module
+}
+
+#[test]
+fn every_shader_is_valid() {
+    for textures in [false, true] {
+        let all = Traits::all(textures);
+        let none = Traits {
+            textured: false,
+            measures: false,
+            lobes: false,
+            clusters: false,
+            skies: false,
+            ..all
+        };
+        for traits in [all, none] {
+            valid(&source(traits));
+        }
+        // Each is a constant of the shader's.
+        assert_eq!(
+            source(all).matches(": bool = true;").count(),
+            source(none).matches(": bool = false;").count()
+        );
+        assert_eq!(source(none).matches(": bool = true;").count(), 0);
+    }
+}
+
+#[test]
+fn rows_lie_where_the_shader_reads_them() {
+    let text = source(Traits::all(false));
+    let module = valid(&text);
     let m = &module;
     assert_eq!(u64::from(layout(m, "Slot").1), SLOT, "size of Slot");
-    same!(m, Node, lo, hi, child);
+    assert_eq!(
+        u64::from(layout(m, "SecondRow").1),
+        SECOND,
+        "size of SecondRow"
+    );
+    same!(m, Fork, corner, spread, lo, nodes, hi, packets);
     same!(m, Packet, v0, e1, e2, gap);
     same!(
         m, Shade, n0, n1, n2, weft, v, colors, material, light, mesh, triangle

@@ -89,6 +89,9 @@ pub(super) struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) name: String,
+    /// It runs on the CPU.
+    pub(super) software: bool,
+    pub(super) max_side: u32,
     pub(super) max_binding: u64,
     pub(super) max_groups: u32,
     trouble: Arc<Mutex<Option<String>>>,
@@ -142,6 +145,8 @@ impl Device {
             device,
             queue,
             name: format!("{} ({:?})", info.name, info.backend),
+            software: is_software(&info),
+            max_side: limits.max_texture_dimension_2d,
             // Drivers misbehave near i32::MAX bytes.
             max_binding: limits
                 .max_storage_buffer_binding_size

@@ -32,8 +32,9 @@ fn ray_new(o: vec3<f32>, d: vec3<f32>) -> Ray {
 
 struct Boxes {
     near: vec4<f32>,
-    // Bits of the lanes that are met.
-    hit: u32,
+    // Which lanes are met.
+    hit: vec4<bool>,
+    children: vec4<u32>,
 }
 
 // Bits of the lanes that are true.
@@ -41,22 +42,36 @@ fn bits(lanes: vec4<bool>) -> u32 {
     return dot(select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), lanes), vec4<u32>(1u));
 }
 
+// Distances to the four sides of the boxes along an axis.
+fn sides(places: u32, step: f32, corner: f32, o: f32, inv: f32) -> vec4<f32> {
+    let q = vec4<i32>((vec4<u32>(places) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(255u));
+    return (corner + vec4<f32>(q) * step - o) * inv;
+}
+
 fn boxes(n: u32, ray: Ray, tmin: f32, tmax: f32) -> Boxes {
-    let ax = (nodes[n].lo[0] - ray.o.x) * ray.inv.x;
-    let bx = (nodes[n].hi[0] - ray.o.x) * ray.inv.x;
-    let ay = (nodes[n].lo[1] - ray.o.y) * ray.inv.y;
-    let by = (nodes[n].hi[1] - ray.o.y) * ray.inv.y;
-    let az = (nodes[n].lo[2] - ray.o.z) * ray.inv.z;
-    let bz = (nodes[n].hi[2] - ray.o.z) * ray.inv.z;
+    let spread = forks[n].spread;
+    let corner = forks[n].corner;
+    let step = bitcast<vec3<f32>>(((vec3<u32>(spread) >> vec3<u32>(0u, 8u, 16u)) & vec3<u32>(255u)) << vec3<u32>(23u));
+    let back = ray.inv < vec3<f32>(0.0);
+    let lo = forks[n].lo;
+    let hi = forks[n].hi;
+    let first = select(lo, hi, back);
+    let last = select(hi, lo, back);
     let near = max(
-        max(select(ax, bx, ray.inv.x < 0.0), select(ay, by, ray.inv.y < 0.0)),
-        max(select(az, bz, ray.inv.z < 0.0), vec4<f32>(tmin)),
+        max(sides(first.x, step.x, corner.x, ray.o.x, ray.inv.x), sides(first.y, step.y, corner.y, ray.o.y, ray.inv.y)),
+        max(sides(first.z, step.z, corner.z, ray.o.z, ray.inv.z), vec4<f32>(tmin)),
     );
     let far = min(
-        min(select(bx, ax, ray.inv.x < 0.0), select(by, ay, ray.inv.y < 0.0)),
-        min(select(bz, az, ray.inv.z < 0.0), vec4<f32>(tmax)),
+        min(sides(last.x, step.x, corner.x, ray.o.x, ray.inv.x), sides(last.y, step.y, corner.y, ray.o.y, ray.inv.y)),
+        min(sides(last.z, step.z, corner.z, ray.o.z, ray.inv.z), vec4<f32>(tmax)),
     );
-    return Boxes(near, bits(near <= far));
+    // The nodes follow each other, and the leaves.
+    let node = (vec4<u32>(spread) >> vec4<u32>(24u, 25u, 26u, 27u)) & vec4<u32>(1u);
+    let leaf = (vec4<u32>(spread) >> vec4<u32>(28u, 29u, 30u, 31u)) & vec4<u32>(1u);
+    let nodes = forks[n].nodes + vec4<u32>(0u, node.x, node.x + node.y, node.x + node.y + node.z);
+    let leaves = (forks[n].packets | LEAF) + vec4<u32>(0u, leaf.x, leaf.x + leaf.y, leaf.x + leaf.y + leaf.z);
+    let children = select(nodes, leaves, leaf == vec4<u32>(1u));
+    return Boxes(near, (near <= far) & ((node | leaf) == vec4<u32>(1u)), children);
 }
 
 struct Four {
@@ -96,56 +111,78 @@ fn triangles(p: u32, ray: Ray, tmin: f32, tmax: f32) -> Four {
     return Four(t, u, v, bits(inside & between));
 }
 
+// Both walks go on with one child and leave the others on the stack, and they go down to a leaf in a loop of its own and
+// test its triangles outside of it (Aila and Laine 2009): where rays run side by side, those at nodes would else wait at
+// every step for one at a leaf.
+
+// The child of a node that is in lane `lane`.
+fn child_of(children: vec4<u32>, lane: u32) -> u32 {
+    let low = select(children.x, children.y, (lane & 1u) != 0u);
+    let high = select(children.z, children.w, (lane & 1u) != 0u);
+    return select(low, high, (lane & 2u) != 0u);
+}
+
 // The nearest hit between tmin and tmax; its place is EMPTY when there is none.
-//
-// Both walks go down to a leaf in a loop of its own and test its triangles outside of it (Aila and Laine 2009): where
-// rays run side by side, those at nodes would else wait at every step for one at a leaf.
 fn nearest(ray: Ray, tmin: f32, tmax: f32) -> Hit {
     var hit = Hit(tmax, EMPTY, 0.0, 0.0);
-    stack[0] = 0u;
-    entries[0] = tmin;
-    var top = 1u;
-    loop {
-        var packet = EMPTY;
-        while (top > 0u) {
-            top -= 1u;
-            let child = stack[top];
-            if (entries[top] >= hit.t) {
+    var child = 0u;
+    var top = 0u;
+    while (child != EMPTY) {
+        while ((child & LEAF) == 0u) {
+            let b = boxes(child, ray, tmin, hit.t);
+            let children = b.children;
+            // The order of the distances, which are not negative, is that of their bits; the last two give way to the
+            // lane, of equals the highest first.
+            var keys = (bitcast<vec4<u32>>(b.near) & vec4<u32>(~3u)) | vec4<u32>(3u, 2u, 1u, 0u);
+            keys = select(vec4<u32>(EMPTY), keys, b.hit);
+            let low = min(keys.xz, keys.yw);
+            let high = max(keys.xz, keys.yw);
+            let first = min(low.x, low.y);
+            let last = max(high.x, high.y);
+            let inner = vec2<u32>(max(low.x, low.y), min(high.x, high.y));
+            let second = min(inner.x, inner.y);
+            let third = max(inner.x, inner.y);
+            if (last != EMPTY) {
+                stack[top] = child_of(children, 3u - (last & 3u));
+                entries[top] = bitcast<f32>(last & ~3u);
+                top += 1u;
+            }
+            if (third != EMPTY) {
+                stack[top] = child_of(children, 3u - (third & 3u));
+                entries[top] = bitcast<f32>(third & ~3u);
+                top += 1u;
+            }
+            if (second != EMPTY) {
+                stack[top] = child_of(children, 3u - (second & 3u));
+                entries[top] = bitcast<f32>(second & ~3u);
+                top += 1u;
+            }
+            if (first != EMPTY) {
+                child = child_of(children, 3u - (first & 3u));
                 continue;
             }
-            if ((child & LEAF) != 0u) {
-                packet = child & ~LEAF;
-                break;
+            child = EMPTY;
+            while (top > 0u && child == EMPTY) {
+                top -= 1u;
+                child = select(EMPTY, stack[top], entries[top] < hit.t);
             }
-            let b = boxes(child, ray, tmin, hit.t);
-            let base = top;
-            var mask = b.hit;
+        }
+        if (child != EMPTY) {
+            let packet = child & ~LEAF;
+            let four = triangles(packet, ray, tmin, hit.t);
+            var mask = four.hit;
             while (mask != 0u) {
                 let lane = firstTrailingBit(mask);
                 mask &= mask - 1u;
-                let entry = b.near[lane];
-                var at = top;
-                while (at > base && entries[at - 1u] < entry) {
-                    stack[at] = stack[at - 1u];
-                    entries[at] = entries[at - 1u];
-                    at -= 1u;
+                if (four.t[lane] < hit.t) {
+                    hit = Hit(four.t[lane], packet * 4u + lane, four.u[lane], four.v[lane]);
                 }
-                stack[at] = nodes[child].child[lane];
-                entries[at] = entry;
-                top += 1u;
             }
         }
-        if (packet == EMPTY) {
-            return hit;
-        }
-        let four = triangles(packet, ray, tmin, hit.t);
-        var mask = four.hit;
-        while (mask != 0u) {
-            let lane = firstTrailingBit(mask);
-            mask &= mask - 1u;
-            if (four.t[lane] < hit.t) {
-                hit = Hit(four.t[lane], packet * 4u + lane, four.u[lane], four.v[lane]);
-            }
+        child = EMPTY;
+        while (top > 0u && child == EMPTY) {
+            top -= 1u;
+            child = select(EMPTY, stack[top], entries[top] < hit.t);
         }
     }
     return hit;
@@ -156,52 +193,75 @@ fn nearest(ray: Ray, tmin: f32, tmax: f32) -> Hit {
 fn transmittance(ray: Ray, tmax: f32, faint: f32, exact: bool, rng: ptr<function, Rng>) -> f32 {
     var product = 1.0;
     var aside = rng_aside(rng);
-    stack[0] = 0u;
-    var top = 1u;
+    var child = 0u;
+    var top = 0u;
+    var packet = 0u;
+    var met = Four();
     loop {
-        var packet = EMPTY;
-        while (top > 0u) {
-            top -= 1u;
-            let child = stack[top];
-            if ((child & LEAF) != 0u) {
+        // On to the next sheet that is met: what is asked of one is long, so it is asked in one place, and never for a leaf
+        // that is not met.
+        while (met.hit == 0u && child != EMPTY) {
+            while ((child & LEAF) == 0u) {
+                let b = boxes(child, ray, 0.0, tmax);
+                // The highest lane that is met is the next; the others wait.
+                child = EMPTY;
+                if (b.hit.x) {
+                    child = b.children.x;
+                }
+                if (b.hit.y) {
+                    if (child != EMPTY) {
+                        stack[top] = child;
+                        top += 1u;
+                    }
+                    child = b.children.y;
+                }
+                if (b.hit.z) {
+                    if (child != EMPTY) {
+                        stack[top] = child;
+                        top += 1u;
+                    }
+                    child = b.children.z;
+                }
+                if (b.hit.w) {
+                    if (child != EMPTY) {
+                        stack[top] = child;
+                        top += 1u;
+                    }
+                    child = b.children.w;
+                }
+                if (child == EMPTY && top > 0u) {
+                    top -= 1u;
+                    child = stack[top];
+                }
+            }
+            if (child != EMPTY) {
                 packet = child & ~LEAF;
-                break;
-            }
-            let b = boxes(child, ray, 0.0, tmax);
-            var mask = b.hit;
-            while (mask != 0u) {
-                let lane = firstTrailingBit(mask);
-                mask &= mask - 1u;
-                stack[top] = nodes[child].child[lane];
-                top += 1u;
+                met = triangles(packet, ray, 0.0, tmax);
+                child = EMPTY;
+                if (top > 0u) {
+                    top -= 1u;
+                    child = stack[top];
+                }
             }
         }
-        if (packet == EMPTY) {
-            return product;
+        if (met.hit == 0u) {
+            break;
         }
-        let four = triangles(packet, ray, 0.0, tmax);
-        // One copy of the code for the four lanes: what is asked of a sheet is long.
-        var mask = four.hit;
-        while (mask != 0u) {
-            let lane = firstTrailingBit(mask);
-            mask &= mask - 1u;
-            var gap = packets[packet].gap[lane];
-            if (gap < 0.0) {
-                gap = gap_at(packet * 4u + lane, four.u[lane], four.v[lane], ray.d);
-            }
-            product *= gap;
-            if (product <= 0.0) {
+        let lane = firstTrailingBit(met.hit);
+        met.hit &= met.hit - 1u;
+        var gap = packets[packet].gap[lane];
+        if ((TEXTURED || MEASURES || LOBES) && gap < 0.0) {
+            gap = gap_at(packet * 4u + lane, met.u[lane], met.v[lane], ray.d);
+        }
+        product *= gap;
+        if (product < faint) {
+            if (product <= 0.0 || exact) {
                 return 0.0;
             }
-            if (product < faint) {
-                if (exact) {
-                    return 0.0;
-                }
-                if (rng_coin(&aside) < 0.5) {
-                    return 0.0;
-                }
-                product *= 2.0;
+            if (rng_coin(&aside) < 0.5) {
+                return 0.0;
             }
+            product *= 2.0;
         }
     }
     return product;

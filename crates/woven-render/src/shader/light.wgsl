@@ -35,14 +35,14 @@ fn light_place(p: vec3<f32>, n: vec3<f32>, transmits: bool) -> Place {
 
 // Rows that are weighed at every point: all lights, or the root of the tree and the lights without a place.
 fn light_candidates() -> u32 {
-    if (frame.globals.tree == NONE) {
+    if (!CLUSTERS || frame.globals.tree == NONE) {
         return frame.globals.lights;
     }
     return 1u + frame.globals.lights - frame.globals.others;
 }
 
 fn light_candidate(k: u32) -> u32 {
-    if (frame.globals.tree == NONE) {
+    if (!CLUSTERS || frame.globals.tree == NONE) {
         return k;
     }
     return select(frame.globals.others + k - 1u, frame.globals.tree, k == 0u);
@@ -113,14 +113,14 @@ fn light_weight(at: Place, i: u32) -> f32 {
         }
         return lum * max(abs(c), 0.05);
     }
-    if (kind == SKY) {
+    if (SKIES && kind == SKY) {
         var angle = PI;
         if (at.inside) {
             angle = windows(at.p);
         }
         return frame.globals.sky_scale.w * angle;
     }
-    if (kind == CLUSTER) {
+    if (CLUSTERS && kind == CLUSTER) {
         return cluster_weight(at, i);
     }
     let to = lights[i].p - at.p;
@@ -199,7 +199,7 @@ fn light_sample(at: Place, u: vec3<f32>) -> LightSample {
         return no_light();
     }
     // Down the tree; what is left of the number chooses on.
-    while (chosen >= frame.globals.lights) {
+    while (CLUSTERS && chosen >= frame.globals.lights) {
         let halves = vec2<u32>(lights[chosen].place, lights[chosen].layer);
         var w = vec2<f32>(0.0);
         for (var k = 0u; k < 2u; k++) {
@@ -245,7 +245,7 @@ fn light_share(at: Place, i: u32) -> f32 {
                 return 0.0;
             }
             let parent = lights[me].parent;
-            if (parent == NONE) {
+            if (!CLUSTERS || parent == NONE) {
                 break;
             }
             other = select(lights[parent].place, lights[parent].layer, lights[parent].place == me);
@@ -262,7 +262,7 @@ fn light_towards(at: Place, i: u32, share: f32, u1: f32, v1: f32) -> LightSample
     let n = lights[i].n;
     let layer = lights[i].layer;
     let kind = lights[i].kind;
-    if (kind == RECT || kind == TRIANGLE || kind == SKY) {
+    if (kind == RECT || kind == TRIANGLE || (SKIES && kind == SKY)) {
         let triangle = kind == TRIANGLE;
         var a = u1;
         var b = v1;
@@ -272,19 +272,19 @@ fn light_towards(at: Place, i: u32, share: f32, u1: f32, v1: f32) -> LightSample
         }
         // The sky is sampled through a window's rectangle, or by its picture.
         var row = i;
-        if (kind == SKY) {
+        if (SKIES && kind == SKY) {
             let w = choose_window(at, u1);
             row = w.row;
             a = w.u;
         }
         var t: Towards;
-        if (row == NONE) {
+        if (SKIES && row == NONE) {
             t = Towards(picture_sample(a, b), 1e9, 1.0);
         } else {
             t = rect_sample(row, row_part(at, i, row), at.p, a, b, triangle);
         }
         var radiance = lights[i].radiance;
-        if (kind == SKY) {
+        if (SKIES && kind == SKY) {
             t.distance = 1e9;
             radiance = sky(t.d);
         } else {
@@ -340,7 +340,7 @@ fn direction_density(at: Place, i: u32, wi: vec3<f32>, distance: f32) -> f32 {
     var count = 1u;
     var all = 1.0;
     var picture = 0.0;
-    if (kind == SKY) {
+    if (SKIES && kind == SKY) {
         first = frame.globals.lights;
         count = select(0u, frame.globals.portals, at.inside);
         picture = 1.0;
@@ -354,7 +354,7 @@ fn direction_density(at: Place, i: u32, wi: vec3<f32>, distance: f32) -> f32 {
         let row = first + k;
         var t = distance;
         var part = 1.0;
-        if (kind == SKY) {
+        if (SKIES && kind == SKY) {
             t = crossing(row, at.p, wi);
             part = frame.globals.portal_share * window(row, at.p) / all;
         }
@@ -362,7 +362,7 @@ fn direction_density(at: Place, i: u32, wi: vec3<f32>, distance: f32) -> f32 {
             pdf += part * rect_density(row, row_part(at, i, row), at.p, wi, t, kind == TRIANGLE);
         }
     }
-    if (picture > 0.0) {
+    if (SKIES && picture > 0.0) {
         pdf += picture * picture_density(wi);
     }
     return pdf;
@@ -379,11 +379,11 @@ fn sky_uv(d: vec3<f32>) -> vec2<f32> {
 fn sky_pixel(x: i32, y: i32) -> vec3<f32> {
     let w = i32(frame.globals.sky_width);
     let h = i32(frame.globals.sky_height);
-    return skies[clamp(y, 0, h - 1) * w + (x + w) % w].xyz;
+    return skies[u32(clamp(y, 0, h - 1) * w + (x + w) % w)].xyz;
 }
 
 fn sky(d: vec3<f32>) -> vec3<f32> {
-    if (frame.globals.sky_width == 0u) {
+    if (!SKIES || frame.globals.sky_width == 0u) {
         return vec3<f32>(0.0);
     }
     let uv = sky_uv(d);

@@ -1,7 +1,7 @@
 // Pixels of a block share the second points of their paths; the pair of cpu/share.rs. A workgroup is a block.
 //
-// Three passes, each over all blocks of a range, in place of barriers: `start` follows the paths, `see` looks at the
-// second points, `finish` adds what they scatter.
+// Passes over all blocks of a range, in place of barriers: `start` follows the paths, `keep` chooses second points, `see`
+// looks at them, `weigh` adds up how likely each was, `finish` adds what they scatter.
 
 const BLOCK: u32 = 8u;
 const GROUP: u32 = 64u;
@@ -32,7 +32,13 @@ struct Slot {
     chosen: u32,
     // What the second point scatters, about.
     brightness: f32,
-    second: SecondRow,
+    // Of the second point that is kept as the n-th, in slot n of the block: its pixel, its weight, and with how much
+    // density all pixels of the block see it.
+    kept: u32,
+    weight: f32,
+    densities: f32,
+    // How many are kept; in the block's first slot.
+    count: u32,
     taken: PixelSum,
     // Of the second points that are kept, in order, from each first point: density and what the pixel takes of their light.
     sights: array<array<vec4<f32>, FIRSTS>, GROUP>,
@@ -48,7 +54,15 @@ struct FirstRow {
 }
 
 struct SecondRow {
-    point: Point,
+    p: vec3<f32>,
+    material: u32,
+    ng: vec3<f32>,
+    alpha: f32,
+    fx: vec3<f32>,
+    width: f32,
+    fz: vec3<f32>,
+    metal: f32,
+    tint: vec3<f32>,
     lit_wi: vec3<f32>,
     pdf: f32,
     light: vec3<f32>,
@@ -56,10 +70,13 @@ struct SecondRow {
     wi: vec3<f32>,
     // 1: who looks has it before him.
     side: u32,
-    beyond: array<vec4<f32>, LAYERS>,
+    beyond: array<vec4<f32>, 4>,
 }
 
-@group(0) @binding(9) var<storage, read_write> slots: array<Slot>;
+@group(0) @binding(10) var<storage, read_write> slots: array<Slot>;
+// The second points as `start` writes them, and a copy that is made after it for the passes that read them.
+@group(0) @binding(11) var<storage, read_write> seconds: array<SecondRow>;
+@group(0) @binding(8) var<storage, read> looks: array<SecondRow>;
 
 fn brightness(y: Second) -> f32 {
     var sum = y.lit.light;
@@ -74,6 +91,12 @@ fn brightness(y: Second) -> f32 {
 fn corner_of(block: u32) -> vec2<i32> {
     let columns = (frame.width + frame.left + BLOCK - 1u) / BLOCK;
     return vec2<i32>(vec2<u32>(block % columns, block / columns) * BLOCK) - vec2<i32>(vec2<u32>(frame.left, frame.above));
+}
+
+// The pixel of its block that a lane looks after: lanes side by side have neighbours above and below too, whose rays stay
+// together longer than those of a row.
+fn member_of(lane: u32) -> u32 {
+    return (lane & 35u) | ((lane & 4u) << 1u) | ((lane & 8u) >> 1u) | (lane & 16u);
 }
 
 fn inside(pixel: vec2<i32>) -> bool {
@@ -96,7 +119,8 @@ fn turn_of(order: u32) -> u32 {
 }
 
 @compute @workgroup_size(64, 1, 1)
-fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
+fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let member = member_of(lane);
     let slot = workgroup.x * GROUP + member;
     let corner = corner_of(frame.block + workgroup.x);
     let pixel = corner + vec2<i32>(vec2<u32>(member % BLOCK, member / BLOCK));
@@ -131,15 +155,24 @@ fn start(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     }
     slots[slot].brightness = brightness(b.second);
     slots[slot].passed = b.second.passed;
-    slots[slot].second.point = point_of(b.second.s);
-    slots[slot].second.side = u32(dot(b.second.s.ng, b.second.s.p - b.firsts[b.chosen].s.p) < 0.0);
-    slots[slot].second.layer = b.second.lit.layer;
-    slots[slot].second.pdf = b.second.lit.pdf;
-    slots[slot].second.lit_wi = b.second.lit.wi;
-    slots[slot].second.light = b.second.lit.light;
-    slots[slot].second.wi = b.second.wi;
+    let y = b.second.s;
+    seconds[slot].p = y.p;
+    seconds[slot].material = y.material;
+    seconds[slot].ng = y.ng;
+    seconds[slot].alpha = y.alpha;
+    seconds[slot].fx = y.fx;
+    seconds[slot].width = y.gloss.x;
+    seconds[slot].fz = y.fz;
+    seconds[slot].metal = y.gloss.y;
+    seconds[slot].tint = y.tint;
+    seconds[slot].side = u32(dot(y.ng, y.p - b.firsts[b.chosen].s.p) < 0.0);
+    seconds[slot].layer = b.second.lit.layer;
+    seconds[slot].pdf = b.second.lit.pdf;
+    seconds[slot].lit_wi = b.second.lit.wi;
+    seconds[slot].light = b.second.lit.light;
+    seconds[slot].wi = b.second.wi;
     for (var k = 0u; k < LAYERS; k++) {
-        slots[slot].second.beyond[k] = vec4<f32>(b.second.beyond[k], 0.0);
+        seconds[slot].beyond[k] = vec4<f32>(b.second.beyond[k], 0.0);
     }
 }
 
@@ -158,7 +191,11 @@ fn under_teeth(x: f32) -> f32 {
 
 fn comb_of(block: u32, base: u32) -> Comb {
     let coin = to_unit(turn_of(order_of(corner_of(frame.block + block))));
-    return Comb(total_of(base), coin, 0.0, 0.0, 0.0);
+    var total = 0.0;
+    for (var k = 0u; k < GROUP; k++) {
+        total += slots[base + k].brightness;
+    }
+    return Comb(total, coin, 0.0, 0.0, 0.0);
 }
 
 // Weight of the next point, that of a slot; 0 if it is not kept.
@@ -182,12 +219,38 @@ fn keeping(comb: ptr<function, Comb>, slot: u32) -> f32 {
     return select(0.0, select(1.0, teeth / length, length < 1.0), teeth > 0.0);
 }
 
-fn total_of(base: u32) -> f32 {
-    var total = 0.0;
-    for (var k = 0u; k < GROUP; k++) {
-        total += slots[base + k].brightness;
+// One lane a block.
+@compute @workgroup_size(8, 1, 1)
+fn keep(@builtin(global_invocation_id) id: vec3<u32>) {
+    let base = id.x * GROUP;
+    if (base >= arrayLength(&slots)) {
+        return;
     }
-    return total;
+    var comb = comb_of(id.x, base);
+    var n = 0u;
+    for (var k = 0u; k < GROUP; k++) {
+        let weight = keeping(&comb, base + k);
+        if (weight > 0.0) {
+            slots[base + n].kept = k;
+            slots[base + n].weight = weight;
+            n += 1u;
+        }
+    }
+    slots[base].count = n;
+}
+
+// A second point that is kept, of those of its block, each by a lane.
+@compute @workgroup_size(64, 1, 1)
+fn weigh(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) n: u32) {
+    let base = workgroup.x * GROUP;
+    if (n >= slots[base].count) {
+        return;
+    }
+    var densities = 0.0;
+    for (var k = 0u; k < GROUP; k++) {
+        densities += slots[base + k].sights[n][0].w + slots[base + k].sights[n][1].w;
+    }
+    slots[base + n].densities = densities;
 }
 
 fn point_of(s: Surface) -> Point {
@@ -208,52 +271,63 @@ fn surface_of(point: Point) -> Surface {
     return s;
 }
 
+fn surface_of_look(i: u32) -> Surface {
+    return surface_of(Point(
+        looks[i].p, looks[i].material, looks[i].ng, looks[i].alpha, looks[i].fx, looks[i].width, looks[i].fz, looks[i].metal,
+        looks[i].tint,
+    ));
+}
+
 @compute @workgroup_size(64, 1, 1)
-fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
+fn see(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let member = member_of(lane);
     let base = workgroup.x * GROUP;
     let slot = base + member;
-    var comb = comb_of(workgroup.x, base);
+    let count = slots[base].count;
+    let chosen = slots[slot].chosen;
+    let own = slots[slot].passed;
     // No coin is tossed on the way.
     var unused = Rng(0u, 0u, 0u);
-    var n = 0u;
-    for (var k = 0u; k < GROUP; k++) {
-        let i = base + k;
-        if (keeping(&comb, i) <= 0.0) {
-            continue;
-        }
-        for (var which = 0u; which < FIRSTS; which++) {
-            var sight = vec4<f32>(0.0);
-            let share = slots[slot].firsts[which].share;
-            if (share > 0.0) {
-                let x = surface_of(slots[slot].firsts[which].point);
-                let y = slots[i].second.point.p;
+    for (var which = 0u; which < FIRSTS; which++) {
+        let share = slots[slot].firsts[which].share;
+        if (share <= 0.0) {
+            for (var n = 0u; n < count; n++) {
+                slots[slot].sights[n][which].w = 0.0;
+            }
+        } else {
+            let x = surface_of(slots[slot].firsts[which].point);
+            let eye = slots[slot].firsts[which].wo;
+            let throughput = slots[slot].firsts[which].throughput;
+            for (var n = 0u; n < count; n++) {
+                let k = slots[base + n].kept;
+                let i = base + k;
+                var sight = vec4<f32>(0.0);
+                let y = looks[i].p;
                 let begin = leave(x, y - x.p);
                 let to = y - begin;
                 let distance2 = max(length2(to), 1e-12);
                 let distance = sqrt(distance2);
                 let d = to * (1.0 / distance);
-                let c = dot(slots[i].second.point.ng, d);
-                if ((c < 0.0) == (slots[i].second.side == 1u)) {
+                let c = dot(looks[i].ng, d);
+                if ((c < 0.0) == (looks[i].side == 1u)) {
                     let wi = local(x, d);
-                    let b = scattering(x.material, x, slots[slot].firsts[which].wo, wi, false, vec3<f32>(0.0));
-                    let yarn = 1.0 - gap_of(slots[i].second.point.material, surface_of(slots[i].second.point), d);
+                    let b = scattering(x.material, x, eye, wi, false, vec3<f32>(0.0));
+                    let yarn = 1.0 - gap_of(looks[i].material, surface_of_look(i), d);
                     let density = share * b.pdf * yarn;
                     if (density > 0.0) {
-                        var passed = slots[slot].passed;
-                        if (k != member || which != slots[slot].chosen) {
+                        var passed = own;
+                        if (k != member || which != chosen) {
                             passed = transmittance(
                                 ray_new(begin, d), distance - (1e-4 + 1e-4 * distance), 1e-12, true, &unused,
                             );
                         }
                         let seen = abs(c) / distance2 * passed;
-                        let carry = slots[slot].firsts[which].throughput * b.f * (abs(wi.z) * seen);
-                        sight = vec4<f32>(carry, density * seen);
+                        sight = vec4<f32>(throughput * b.f * (abs(wi.z) * seen), density * seen);
                     }
                 }
+                slots[slot].sights[n][which] = sight;
             }
-            slots[slot].sights[n][which] = sight;
         }
-        n += 1u;
     }
 }
 
@@ -263,60 +337,63 @@ fn finite(l: vec3<f32>) -> vec3<f32> {
 }
 
 @compute @workgroup_size(64, 1, 1)
-fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) member: u32) {
+fn finish(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let member = member_of(lane);
     let pixel = corner_of(frame.block + workgroup.x) + vec2<i32>(vec2<u32>(member % BLOCK, member / BLOCK));
     if (!inside(pixel)) {
         return;
     }
     let base = workgroup.x * GROUP;
     let slot = base + member;
-    var comb = comb_of(workgroup.x, base);
+    let count = slots[base].count;
     var light: array<vec3<f32>, LAYERS>;
     for (var k = 0u; k < LAYERS; k++) {
         light[k] = slots[slot].taken.indirect[k].xyz;
     }
-    var n = 0u;
-    for (var m = 0u; m < GROUP; m++) {
-        let i = base + m;
-        let weight = keeping(&comb, i);
-        if (weight <= 0.0) {
-            continue;
+    // The sights in order, which are looked for in a loop of its own: what follows is long, and where lanes run side by side
+    // it would be done for those that see nothing.
+    var at = 0u;
+    loop {
+        while (at < FIRSTS * count) {
+            if (slots[slot].sights[at / FIRSTS][at % FIRSTS].w > 0.0) {
+                break;
+            }
+            at += 1u;
         }
-        for (var which = 0u; which < FIRSTS; which++) {
-            let sight = slots[slot].sights[n][which];
-            if (sight.w <= 0.0) {
-                continue;
+        if (at >= FIRSTS * count) {
+            break;
+        }
+        let n = at / FIRSTS;
+        let which = at % FIRSTS;
+        at += 1u;
+        let i = base + slots[base + n].kept;
+        let carry = slots[slot].sights[n][which].xyz * (slots[base + n].weight / slots[base + n].densities);
+        let s = surface_of_look(i);
+        let x = surface_of(slots[slot].firsts[which].point);
+        let to = s.p - leave(x, s.p - x.p);
+        let wo = local(s, to * (-1.0 / sqrt(max(length2(to), 1e-12))));
+        // By event all that comes this way is of one layer.
+        let event = event_of(slots[slot].firsts[which].front == 1u, local(x, to), slots[slot].firsts[which].wo);
+        // Light that was sampled there, then what the path found beyond: one place for the scattering.
+        for (var part = 0u; part < 2u; part++) {
+            var wi = looks[i].wi;
+            if (part == 0u) {
+                wi = looks[i].lit_wi;
             }
-            var all_densities = 0.0;
-            for (var k = 0u; k < GROUP; k++) {
-                all_densities += slots[base + k].sights[n][0].w + slots[base + k].sights[n][1].w;
-            }
-            let carry = sight.xyz * (weight / all_densities);
-            let s = surface_of(slots[i].second.point);
-            let x = surface_of(slots[slot].firsts[which].point);
-            let to = s.p - leave(x, s.p - x.p);
-            let wo = local(s, to * (-1.0 / sqrt(max(length2(to), 1e-12))));
-            // By event all that comes this way is of one layer.
-            let event = event_of(slots[slot].firsts[which].front == 1u, local(x, to), slots[slot].firsts[which].wo);
-            // Light that was sampled there, then what the path found beyond: one place for the scattering.
-            for (var part = 0u; part < 2u; part++) {
-                let wi = local(s, select(slots[i].second.wi, slots[i].second.lit_wi, part == 0u));
-                let b = scattering(s.material, s, wo, wi, false, vec3<f32>(0.0));
-                if (part == 0u) {
-                    var value = b.f * slots[i].second.light;
-                    if (slots[i].second.pdf > 0.0) {
-                        value *= heuristic(slots[i].second.pdf, b.pdf);
-                    }
-                    light[layer_of(event, slots[i].second.layer)] += value * carry;
-                } else {
-                    let f = b.f * carry;
-                    for (var k = 0u; k < LAYERS; k++) {
-                        light[layer_of(event, k)] += f * slots[i].second.beyond[k].xyz;
-                    }
+            let b = scattering(s.material, s, wo, local(s, wi), false, vec3<f32>(0.0));
+            if (part == 0u) {
+                var value = b.f * looks[i].light;
+                if (looks[i].pdf > 0.0) {
+                    value *= heuristic(looks[i].pdf, b.pdf);
+                }
+                light[layer_of(event, looks[i].layer)] += value * carry;
+            } else {
+                let f = b.f * carry;
+                for (var k = 0u; k < LAYERS; k++) {
+                    light[layer_of(event, k)] += f * looks[i].beyond[k].xyz;
                 }
             }
         }
-        n += 1u;
     }
     let place = u32(pixel.y) * frame.width + u32(pixel.x);
     var sum = vec3<f32>(0.0);

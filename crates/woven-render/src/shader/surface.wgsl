@@ -110,9 +110,9 @@ fn surface(hit: Hit, wide: f32) -> Surface {
     var gloss = vec2<f32>(1.0, 0.0);
     var uv = vec2<f32>(0.0);
     var f = shading_frame(place, hit.u, hit.v, ng);
-    if (materials[material].color_texture != NONE || materials[material].coverage_texture != NONE
+    if (TEXTURED && (materials[material].color_texture != NONE || materials[material].coverage_texture != NONE
         || materials[material].emission_texture != NONE || materials[material].normal_texture != NONE
-        || materials[material].gloss_texture != NONE) {
+        || materials[material].gloss_texture != NONE)) {
         uv = uv_at(place, hit.u, hit.v);
         let area = wide * wide * shades[place].v.w;
         if (materials[material].color_texture != NONE) {
@@ -128,7 +128,7 @@ fn surface(hit: Hit, wide: f32) -> Surface {
         }
         alpha = coverage(material, uv, area);
     }
-    if (shades[place].colors.w != 0u) {
+    if (TEXTURED && shades[place].colors.w != 0u) {
         let w = vec3<f32>(1.0 - hit.u - hit.v, hit.u, hit.v);
         var sum = vec3<f32>(0.0);
         for (var k = 0u; k < 3u; k++) {
@@ -141,7 +141,7 @@ fn surface(hit: Hit, wide: f32) -> Surface {
 }
 
 fn open_along(m: u32, w: vec3<f32>) -> f32 {
-    if ((materials[m].flags & MEASURED) != 0u) {
+    if (MEASURES && (materials[m].flags & MEASURED) != 0u) {
         return measured_gap(materials[m].measured, w);
     }
     let shape = materials[m].shape[0];
@@ -154,7 +154,7 @@ fn covered(m: u32, alpha: f32, open: f32) -> f32 {
 }
 
 fn gap_of(m: u32, s: Surface, d: vec3<f32>) -> f32 {
-    if (materials[m].gap >= 0.0) {
+    if (!(TEXTURED || MEASURES || LOBES) || materials[m].gap >= 0.0) {
         return materials[m].gap;
     }
     return covered(m, s.alpha, open_along(m, local(s, d)));
@@ -163,7 +163,7 @@ fn gap_of(m: u32, s: Surface, d: vec3<f32>) -> f32 {
 fn gap_at(place: u32, u: f32, v: f32, d: vec3<f32>) -> f32 {
     let m = shades[place].material;
     var alpha = 1.0;
-    if (materials[m].coverage_texture != NONE) {
+    if (TEXTURED && materials[m].coverage_texture != NONE) {
         alpha = coverage(m, uv_at(place, u, v), 0.0);
         if (alpha <= 0.0) {
             return covered(m, 0.0, 1.0);
@@ -271,7 +271,7 @@ fn emission(m: u32, s: Surface, wo: vec3<f32>) -> vec3<f32> {
         return vec3<f32>(0.0);
     }
     let e = materials[m].emission.xyz;
-    if (materials[m].emission_texture == NONE) {
+    if (!TEXTURED || materials[m].emission_texture == NONE) {
         return e;
     }
     return e * texel(materials[m].emission_texture, s.uv, 0.0).xyz;
@@ -280,7 +280,7 @@ fn emission(m: u32, s: Surface, wo: vec3<f32>) -> vec3<f32> {
 fn emission_at(place: u32, u: f32, v: f32) -> vec3<f32> {
     let m = shades[place].material;
     let e = materials[m].emission.xyz;
-    if (materials[m].emission_texture == NONE) {
+    if (!TEXTURED || materials[m].emission_texture == NONE) {
         return e;
     }
     return e * texel(materials[m].emission_texture, uv_at(place, u, v), 0.0).xyz;
@@ -313,11 +313,11 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
         wi = vec3<f32>(r * sc.y, r * sc.x, select(z, -z, (wo.z > 0.0) == through));
     }
     var pdf = select(w0.z, w0.x, wi.z * wo.z < 0.0) * abs(wi.z) * FRAC_1_PI;
-    if ((flags & (MATT | EVEN)) == (MATT | EVEN)) {
+    if (!(MEASURES || LOBES) || (flags & (MATT | EVEN)) == (MATT | EVEN)) {
         let k = materials[m].linear[select(2u + back, 0u, wi.z * wo.z < 0.0)].xyz;
         return Scattered(wi, k * scale * (materials[m].cover * FRAC_1_PI), pdf);
     }
-    if ((flags & MEASURED) != 0u) {
+    if (MEASURES && (flags & MEASURED) != 0u) {
         let first = materials[m].measured;
         if (draw) {
             wi = measured_sample(first, wo, u);
@@ -336,7 +336,7 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
     let plain = (flags & PLAIN_GLOSS) != 0u;
     var rest = s.tint;
     var gloss = materials[m].linear[3u + back].xyz * select(s.tint, vec3<f32>(1.0), plain);
-    if (materials[m].gloss_texture != NONE) {
+    if (TEXTURED && materials[m].gloss_texture != NONE) {
         let metal = s.gloss.y;
         let f0 = shape[7];
         shape[5] = max(shape[5] * s.gloss.x, LEAST_WIDTH);
@@ -359,7 +359,7 @@ fn scattering(m: u32, s: Surface, wo: vec3<f32>, known: vec3<f32>, draw: bool, u
     var f = vec3<f32>(0.0);
     var part = s.alpha;
     // The woven share, then the closed one where a map tells them apart: one copy of the code.
-    let parts = select(1u, 2u, (flags & MULTIPLIES) != 0u);
+    let parts = select(1u, 2u, TEXTURED && (flags & MULTIPLIES) != 0u);
     for (var k = 0u; k < parts; k++) {
         let basis = sheet_basis(shape, wi, wo);
         f += (materials[m].linear[0].xyz * basis[0] + materials[m].linear[1].xyz * basis[1]

@@ -37,10 +37,22 @@ const SPOT: u32 = 4u;
 const SKY: u32 = 5u;
 const CLUSTER: u32 = 7u;
 
-struct Node {
-    lo: array<vec4<f32>, 3>,
-    hi: array<vec4<f32>, 3>,
-    child: vec4<u32>,
+// What the scene has of each kind; where there is nothing, its part of the shader goes. lavapipe runs both branches of
+// every `if`, so what no ray needs costs as much there as what all do.
+const TEXTURED: bool = true;
+const MEASURES: bool = true;
+const LOBES: bool = true;
+const CLUSTERS: bool = true;
+const SKIES: bool = true;
+
+struct Fork {
+    corner: vec3<f32>,
+    // By axis 8 bits, the exponent of the step; the lanes that are nodes, then those that are leaves, by a bit each.
+    spread: u32,
+    lo: vec3<u32>,
+    nodes: u32,
+    hi: vec3<u32>,
+    packets: u32,
 }
 
 struct Packet {
@@ -146,7 +158,7 @@ struct PixelSum {
 
 // Storage, not uniform: lavapipe compiles a shader anew whenever the numbers in a uniform buffer change.
 @group(0) @binding(0) var<storage, read> frame: Frame;
-@group(0) @binding(1) var<storage, read> nodes: array<Node>;
+@group(0) @binding(1) var<storage, read> forks: array<Fork>;
 @group(0) @binding(2) var<storage, read> packets: array<Packet>;
 @group(0) @binding(3) var<storage, read> shades: array<Shade>;
 @group(0) @binding(4) var<storage, read> materials: array<MaterialRow>;
@@ -154,4 +166,4 @@ struct PixelSum {
 @group(0) @binding(5) var<storage, read> texels: array<u32>;
 @group(0) @binding(6) var<storage, read> lights: array<LightRow>;
 @group(0) @binding(7) var<storage, read> skies: array<vec4<f32>>;
-@group(0) @binding(8) var<storage, read_write> sums: array<PixelSum>;
+@group(0) @binding(9) var<storage, read_write> sums: array<PixelSum>;

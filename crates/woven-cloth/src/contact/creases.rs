@@ -77,18 +77,34 @@ pub(super) fn hold_open(grids: &[Grid], inv_mass: &[f64], before: &Field, x: &mu
                 if !watched.iter().any(near) {
                     continue;
                 }
+                let ease = eased(g, inv_mass, x, i);
                 for (at, least) in pairs {
-                    open(g, inv_mass, before, x, [i, j], at, [least, hp]);
+                    open(g, inv_mass, before, x, [i, j], at, [ease * least, hp]);
                 }
                 for (at, cell, least) in leaning {
                     if let Some(j) = j.checked_sub(cell[1]) {
                         let from = [i.saturating_sub(cell[0]), j];
-                        open(g, inv_mass, before, x, from, at, [least, hp]);
+                        open(g, inv_mass, before, x, from, at, [ease * least, hp]);
                     }
                 }
             }
         }
     }
+}
+
+/// How far creases under the columns from `i` on may be held open, 0 to 1: no more than the held heading itself is.
+#[inline(always)]
+fn eased(g: &Grid, inv_mass: &[f64], x: &Field, i: usize) -> f64 {
+    let least = OPEN * 2.0 * g.hx;
+    let mut ease = 1.0;
+    for k in i..(i + SIDE).min(g.nx.saturating_sub(2)) {
+        let (a, b) = (g.first + k, g.first + k + 2);
+        if inv_mass[a] == 0.0 && inv_mass[b] == 0.0 {
+            let d2: f64 = (0..3).map(|c| (x[c][b] - x[c][a]).powi(2)).sum();
+            ease = (d2.sqrt() / least).min(ease);
+        }
+    }
+    ease
 }
 
 /// How many vertices of a row from `from` on have all of `at`, at most [`SIDE`].

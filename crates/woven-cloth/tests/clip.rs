@@ -263,7 +263,9 @@ fn a_curtain_drawn_to_a_fifth_of_its_rail_stays_whole() {
         strain * 100.0
     );
     assert!((heading - 0.2).abs() < 1e-9 && (s.x[0][0] + 0.5).abs() < 1e-9);
-    assert!(strain < 0.1, "{strain}");
+    // Half again the strain of the converged reference (3.1 %), as for gusts; 0.36 % found, 8.5 % where creases were held open
+    // further than the pleats are.
+    assert!(strain < 0.0465, "{strain}");
     assert_eq!(through, 0);
 }
 

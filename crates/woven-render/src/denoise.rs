@@ -276,7 +276,7 @@ fn noise(
         .collect()
 }
 
-/// Brings single specks down to the brightest believable value; returns the factor for each pixel.
+/// Brings single specks down to what their neighbours believe; returns the factor for each pixel.
 fn tame(plain: &mut [[f32; 3]], width: usize, height: usize) -> Vec<f32> {
     let lum: Vec<f32> = plain.iter().map(|c| luminance(*c)).collect();
     let factors: Vec<f32> = (0..plain.len())
@@ -297,9 +297,10 @@ fn tame(plain: &mut [[f32; 3]], width: usize, height: usize) -> Vec<f32> {
                 return 1.0;
             }
             near[..n].sort_by(|a, b| b.total_cmp(a));
-            // The third brightest neighbour: an edge has more bright pixels than that, a speck with its shadow fewer.
-            let limit = near[2] * 1.5 + 1e-6;
-            if lum[i] > limit { limit / lum[i] } else { 1.0 }
+            // The third brightest neighbour: an edge has more bright pixels than that, a speck with its shadow fewer. A speck
+            // becomes as bright as that one: left brighter it would still be unlike all around it, and stay.
+            let near = near[2] + 1e-6;
+            if lum[i] > 1.5 * near { near / lum[i] } else { 1.0 }
         })
         .collect();
     plain

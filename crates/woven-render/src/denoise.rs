@@ -300,7 +300,11 @@ fn tame(plain: &mut [[f32; 3]], width: usize, height: usize) -> Vec<f32> {
             // The third brightest neighbour: an edge has more bright pixels than that, a speck with its shadow fewer. A speck
             // becomes as bright as that one: left brighter it would still be unlike all around it, and stay.
             let near = near[2] + 1e-6;
-            if lum[i] > 1.5 * near { near / lum[i] } else { 1.0 }
+            if lum[i] > 1.5 * near {
+                near / lum[i]
+            } else {
+                1.0
+            }
         })
         .collect();
     plain

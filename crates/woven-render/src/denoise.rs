@@ -9,6 +9,9 @@
 //! 4. light that was scattered before changes slowly, and its noise is shared by blocks of pixels: it is smoothed widely
 //!    (`wide`). A film without the layer "indirect" goes through 3 as a whole.
 //!
+//! Last, a pixel that the filter found nothing alike for, as where an edge mixes two surfaces, and that is darker or brighter than
+//! all around it within its noise, takes a neighbour's light (`specks`).
+//!
 //! What is seen through the gaps carries almost no noise (the renderer splits it off without a coin), so measured in
 //! that noise its edges are steep and stay; the gap's own edges count as a feature. Each light layer gets the same weights,
 //! so their sum stays the picture.
@@ -16,6 +19,7 @@
 //! The filters add weighted *differences* to a pixel: a constant picture comes back bit for bit.
 
 mod patches;
+mod specks;
 mod wide;
 
 use crate::film::{BEAUTY, Film};
@@ -167,14 +171,15 @@ fn filtered(
         })
         .collect();
     let mut tamed = divided;
-    let scale = tame(&mut tamed[0], width, height);
+    let scale = specks::tame(&mut tamed[0], width, height);
     for layer in &mut tamed[1..] {
         for (p, s) in layer.iter_mut().zip(&scale) {
             *p = p.map(|c| c * s);
         }
     }
     let sources: Vec<&[[f32; 3]]> = tamed.iter().map(Vec::as_slice).collect();
-    let changes = filter(&sources, noise, guides, width, height, settings);
+    let mut changes = filter(&sources, noise, guides, width, height, settings);
+    specks::mend(&sources, &mut changes, noise, width, height);
     layers
         .into_iter()
         .zip(changes)
@@ -274,44 +279,6 @@ fn noise(
         .zip(near)
         .map(|(a, b)| a.min(b * 4.0).max(b * 0.5))
         .collect()
-}
-
-/// Brings single specks down to what their neighbours believe; returns the factor for each pixel.
-fn tame(plain: &mut [[f32; 3]], width: usize, height: usize) -> Vec<f32> {
-    let lum: Vec<f32> = plain.iter().map(|c| luminance(*c)).collect();
-    let factors: Vec<f32> = (0..plain.len())
-        .into_par_iter()
-        .map(|i| {
-            let (x, y) = (i % width, i / width);
-            let mut near = [0.0_f32; 24];
-            let mut n = 0;
-            for yy in y.saturating_sub(2)..(y + 3).min(height) {
-                for xx in x.saturating_sub(2)..(x + 3).min(width) {
-                    if (xx, yy) != (x, y) {
-                        near[n] = lum[yy * width + xx];
-                        n += 1;
-                    }
-                }
-            }
-            if n < 8 {
-                return 1.0;
-            }
-            near[..n].sort_by(|a, b| b.total_cmp(a));
-            // The third brightest neighbour: an edge has more bright pixels than that, a speck with its shadow fewer. A speck
-            // becomes as bright as that one: left brighter it would still be unlike all around it, and stay.
-            let near = near[2] + 1e-6;
-            if lum[i] > 1.5 * near {
-                near / lum[i]
-            } else {
-                1.0
-            }
-        })
-        .collect();
-    plain
-        .iter_mut()
-        .zip(&factors)
-        .for_each(|(p, f)| *p = p.map(|c| c * f));
-    factors
 }
 
 /// Mean over a square of half-width `r`, cut at the border.

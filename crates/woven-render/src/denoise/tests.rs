@@ -211,3 +211,44 @@ fn light_layers_add_up_with_indirect_light_too() {
         );
     }
 }
+
+#[test]
+fn what_no_neighbour_is_like_goes_where_it_is_noise_and_stays_where_it_is_not() {
+    // A pixel in which an edge mixes two surfaces, dark by chance; a line one pixel wide; a dark point without noise.
+    let (w, h) = (48, 32);
+    let (mixed, point) = (10 * w + 12, 20 * w + 38);
+    let line = |i: usize| i / w == 20 && i % w < 24;
+    let mut film = Film::new(w, h);
+    let (mut beauty, mut albedo, mut variance) = (vec![], vec![], vec![]);
+    for i in 0..w * h {
+        beauty.push(if i == mixed {
+            [0.1; 3]
+        } else if line(i) {
+            [0.2; 3]
+        } else if i == point {
+            [0.3; 3]
+        } else {
+            [0.5; 3]
+        });
+        albedo.push([if i == mixed || line(i) { 0.9 } else { 0.5 }; 3]);
+        variance.push([if i % w < 24 { 0.04 } else { 0.0 }; 3]);
+    }
+    let was = beauty.clone();
+    film.push(BEAUTY, beauty);
+    film.push("albedo", albedo);
+    film.push("variance", variance);
+    denoise(&mut film, &Settings::default());
+    let is = film.beauty().unwrap();
+    // The light of the neighbours, one unit, times its own albedo.
+    assert!((is[mixed][1] - 0.9).abs() < 0.1, "{:?}", is[mixed]);
+    // Its two ends have one neighbour of their kind and may go.
+    for i in (0..w * h).filter(|&i| line(i) && (1..23).contains(&(i % w))) {
+        assert!(
+            (is[i][1] - was[i][1]).abs() < 0.05,
+            "{:?} at {}",
+            is[i],
+            i % w
+        );
+    }
+    assert_eq!(is[point], was[point]);
+}

@@ -1,7 +1,9 @@
 //! The production solver against the explicit reference in gusts: two exact solvers part within seconds, so statistics are compared.
 //!
-//! `cargo run --release -p woven-cloth --example statistics -- 8` hangs a sheet of 1.0 m x 2.4 m in gusts of eight seeds with either
-//! solver, 4 s each, and prints mean and rms reach of the hem and rms speed over the last 2 s, and the largest strain.
+//! `cargo run --release -p woven-cloth --example statistics -- 8 [ms] [finer] [left out]` hangs a sheet of 1.0 m x 2.4 m in gusts of eight seeds
+//! with either solver, 4 s each, and prints mean and rms reach of the hem and rms speed over the last 2 s, the largest strain, and the
+//! differences seed by seed with their standard errors: `ms` is the retardation time of the threads, 0 unless given; `finer` divides
+//! the production solver's step; with anything `left out` it is compared with itself at the full step instead of the reference.
 
 #[path = "../tests/known_answers/cloth.rs"]
 mod cloth;
@@ -19,8 +21,12 @@ struct Sums {
     strain: f64,
 }
 
-fn sheet() -> Sheet {
-    let mut sheet = Sheet::flat(25, 49, 1.0, 2.4, cloth());
+fn sheet(damping: f64) -> Sheet {
+    let mechanics = Mechanics {
+        stretch_damping: damping,
+        ..cloth()
+    };
+    let mut sheet = Sheet::flat(25, 49, 1.0, 2.4, mechanics);
     for k in 0..sheet.len() {
         // Two soft folds, so that the motion is not that of a plane.
         let [x, y, _] = sheet.position(k);
@@ -30,7 +36,7 @@ fn sheet() -> Sheet {
     sheet
 }
 
-fn run(seed: u64, explicit: bool, sums: &mut Sums) {
+fn run(seed: u64, explicit: bool, [damping, finer]: [f64; 2], sums: &mut Sums) {
     let spec = WindSpec {
         speed: 2.1,
         gust: 0.3,
@@ -38,12 +44,14 @@ fn run(seed: u64, explicit: bool, sums: &mut Sums) {
         ..WindSpec::default()
     };
     let wind = Wind::new(&spec, seed);
-    let mut sheet = sheet();
+    let mut sheet = sheet(damping);
     let tick = 1.0 / 600.0;
     let longest = if explicit {
-        explicit_step(&sheet)
+        // Explicit damping of the stiffest mode, ω = 1 / step, is stable while tau ω² step stays below 2.
+        let step = explicit_step(&sheet);
+        step.min(step * step / damping.max(1e-12))
     } else {
-        gust_step(&sheet, GRAVITY)
+        gust_step(&sheet, GRAVITY) / finer
     };
     let steps = (tick / longest - 1e-9).ceil().max(2.0);
     let dt = tick / steps;
@@ -80,51 +88,64 @@ fn run(seed: u64, explicit: bool, sums: &mut Sums) {
     }
 }
 
+/// Mean, and its standard error, of value `k` of the seeds.
+fn mean(each: &[[f64; 4]], k: usize) -> (f64, f64) {
+    let n = each.len() as f64;
+    let mean = each.iter().map(|v| v[k]).sum::<f64>() / n;
+    let squares = each.iter().map(|v| (v[k] - mean).powi(2)).sum::<f64>();
+    (mean, (squares / (n - 1.0).max(1.0) / n).sqrt())
+}
+
 fn main() {
-    let seeds: u64 = std::env::args()
-        .nth(1)
-        .and_then(|a| a.parse().ok())
-        .unwrap_or(8);
+    let arg = |n: usize, or: f64| {
+        let given = std::env::args().nth(n);
+        given.and_then(|a| a.parse().ok()).unwrap_or(or)
+    };
+    let (seeds, damping, finer) = (arg(1, 8.0) as u64, arg(2, 0.0) / 1000.0, arg(3, 1.0));
+    let itself = std::env::args().len() > 4;
     let mut found = Vec::new();
-    for explicit in [true, false] {
+    for first in [true, false] {
+        let explicit = first && !itself;
         let each: Vec<[f64; 4]> = (1..=seeds)
             .map(|seed| {
                 let mut s = Sums::default();
-                run(seed, explicit, &mut s);
+                let finer = if first { 1.0 } else { finer };
+                run(seed, explicit, [damping, finer], &mut s);
+                let rms = |sum: f64| (sum / s.n).sqrt();
                 [
                     s.reach / s.n,
-                    s.reach2 / s.n,
-                    s.speed2 / s.n,
+                    rms(s.reach2),
+                    rms(s.speed2),
                     s.strain * 100.0,
                 ]
             })
             .collect();
-        let n = each.len() as f64;
-        let mean = |k: usize| each.iter().map(|v| v[k]).sum::<f64>() / n;
-        // Standard error of a mean over the seeds, as a share of it.
-        let error = |k: usize| {
-            let squares = each.iter().map(|v| (v[k] - mean(k)).powi(2)).sum::<f64>();
-            (squares / (n - 1.0).max(1.0) / n).sqrt() / mean(k) * 100.0
-        };
-        let values = [mean(0), mean(1).sqrt(), mean(2).sqrt()];
         let strain = each.iter().map(|v| v[3]).fold(0.0, f64::max);
+        let [a, b, c] = [0, 1, 2].map(|k| mean(&each, k));
         println!(
-            "{}: hem reach mean {:.4} m (+-{:.1} %), rms {:.4} m (+-{:.1} %); rms speed {:.4} m/s (+-{:.1} %); largest strain {strain:.2} %",
+            "{}: hem reach mean {:.4} +- {:.4} m, rms {:.4} +- {:.4} m; rms speed {:.4} +- {:.4} m/s; largest strain {strain:.2} %",
             if explicit { "reference " } else { "production" },
-            values[0],
-            error(0),
-            values[1],
-            0.5 * error(1),
-            values[2],
-            0.5 * error(2),
+            a.0,
+            a.1,
+            b.0,
+            b.1,
+            c.0,
+            c.1,
         );
-        found.push(values);
+        found.push(each);
     }
-    let off = |k: usize| (found[1][k] / found[0][k] - 1.0) * 100.0;
-    println!(
-        "{seeds} seeds, production against reference: mean reach {:+.2} %, rms reach {:+.2} %, rms speed {:+.2} %",
-        off(0),
-        off(1),
-        off(2)
-    );
+    let [first, second] = [&found[0], &found[1]];
+    let off: Vec<[f64; 4]> = first
+        .iter()
+        .zip(second)
+        .map(|(a, b)| std::array::from_fn(|k| b[k] - a[k]))
+        .collect();
+    for (k, name) in ["mean reach", "rms reach", "rms speed"].iter().enumerate() {
+        let (of, (off, error)) = (mean(first, k).0 / 100.0, mean(&off, k));
+        println!(
+            "{seeds} seeds, second against first, seed by seed: {name} {:+.2} % +- {:.2}",
+            off / of,
+            error / of
+        );
+    }
 }

@@ -4,6 +4,7 @@ mod cells;
 mod creases;
 mod distance;
 mod folds;
+mod glance;
 mod guard;
 mod motions;
 mod net;

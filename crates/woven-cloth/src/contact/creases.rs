@@ -71,13 +71,19 @@ pub(super) fn hold_open(grids: &[Grid], inv_mass: &[f64], before: &Field, x: &mu
             let away = ((1.5 - along) * g.hx).hypot((0.5 + along) * g.hy);
             (at, cell, OPEN * away)
         });
+        // What is held does not move here, so one look at the heading does for all rows.
+        let held: Vec<f64> = (0..g.nx)
+            .step_by(SIDE)
+            .map(|i| eased(g, inv_mass, x, i))
+            .collect();
         for j in 0..g.ny {
-            for i in (0..g.nx).step_by(SIDE) {
-                let near = |(pair, watch): &([At; 2], f64)| nearest(g, x, [i, j], *pair) < *watch;
-                if !watched.iter().any(near) {
+            for (i, &ease) in (0..g.nx).step_by(SIDE).zip(&held) {
+                let bent = |(pair, watch): &([At; 2], f64)| {
+                    any_within(g, x, [i, j], [pair[0], pair[1], pair[1]], *watch)
+                };
+                if !watched.iter().any(bent) {
                     continue;
                 }
-                let ease = eased(g, inv_mass, x, i);
                 for (at, least) in pairs {
                     open(g, inv_mass, before, x, [i, j], at, [ease * least, hp]);
                 }
@@ -123,23 +129,51 @@ fn number(g: &Grid, from: At, at: At) -> usize {
     g.first + (from[1] + at[1]) * g.nx + from[0] + at[0]
 }
 
-/// The least squared distance of the pairs `at` from `from` on.
+/// Whether one of the squared distances, of the first of `at` from the middle of the other two, is below `limit`, from `from` on.
 #[inline(always)]
-fn nearest(g: &Grid, x: &Field, from: At, at: [At; 2]) -> f64 {
+fn any_within(g: &Grid, x: &Field, from: At, at: [At; 3], limit: f64) -> bool {
     let n = many(g, from, at);
-    let [p, q] = at.map(|at| number(g, from, at));
-    let mut nearest = f64::INFINITY;
     if n == 0 {
-        return nearest;
+        return false;
     }
-    let [px, py, pz] = [0, 1, 2].map(|c| &x[c][p..p + n]);
-    let [qx, qy, qz] = [0, 1, 2].map(|c| &x[c][q..q + n]);
-    for k in 0..n {
-        let (dx, dy, dz) = (qx[k] - px[k], qy[k] - py[k], qz[k] - pz[k]);
-        let d2 = dx * dx + dy * dy + dz * dz;
-        nearest = if d2 < nearest { d2 } else { nearest };
+    let first = at.map(|at| number(g, from, at));
+    // A whole stretch at once; where the row ends before, its other pairs are of no matter, but seldom near.
+    if none_of_a_stretch(x, first, at[1] == at[2], limit) {
+        return false;
     }
-    nearest
+    (0..n).any(|k| squared(away(x, first, k)) < limit)
+}
+
+/// Whether all of [`SIDE`] squared distances are `limit` or more; not told where less is left of the cloth.
+#[inline(always)]
+fn none_of_a_stretch(x: &Field, [a, b, c]: [usize; 3], pairs: bool, limit: f64) -> bool {
+    let mut d2 = [0.0; SIDE];
+    for x in x {
+        let stretch = |k: usize| x.get(k..).and_then(<[f64]>::first_chunk::<SIDE>);
+        let (Some(p), Some(q), Some(r)) = (stretch(a), stretch(b), stretch(c)) else {
+            return false;
+        };
+        for k in 0..SIDE {
+            let d = p[k] - if pairs { q[k] } else { 0.5 * (q[k] + r[k]) };
+            d2[k] += d * d;
+        }
+    }
+    let mut near = false;
+    for d2 in d2 {
+        near |= d2 < limit;
+    }
+    !near
+}
+
+/// From the middle of `b` and `c` to `a`, all of them `k` further on.
+#[inline(always)]
+fn away(x: &Field, [a, b, c]: [usize; 3], k: usize) -> [f64; 3] {
+    std::array::from_fn(|d| x[d][a + k] - 0.5 * (x[d][b + k] + x[d][c + k]))
+}
+
+#[inline(always)]
+fn squared(d: [f64; 3]) -> f64 {
+    d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
 }
 
 /// Opens what is nearer than `least`: the first of `at` and the middle of the other two, from `from` on.
@@ -154,14 +188,14 @@ fn open(
     [least, hp]: [f64; 2],
 ) {
     let n = many(g, from, at);
-    let [a, b, c] = at.map(|at| number(g, from, at));
-    let away = |x: &Field, k: usize| -> [f64; 3] {
-        std::array::from_fn(|d| x[d][a + k] - 0.5 * (x[d][b + k] + x[d][c + k]))
-    };
-    let squared = |d: [f64; 3]| d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    let first = at.map(|at| number(g, from, at));
+    if n == 0 || none_of_a_stretch(x, first, at[1] == at[2], least * least) {
+        return;
+    }
+    let [a, b, c] = first;
     let mut far = [0.0; SIDE];
     for k in 0..n {
-        far[k] = squared(away(x, k));
+        far[k] = squared(away(x, first, k));
     }
     for k in 0..n {
         if far[k] >= least * least {
@@ -169,13 +203,13 @@ fn open(
         }
         let (wa, wb, wc) = (inv_mass[a + k], inv_mass[b + k], inv_mass[c + k]);
         let mass = wa + if b == c { wb } else { 0.25 * (wb + wc) };
-        let d = away(x, k);
+        let d = away(x, first, k);
         let length = squared(d).sqrt();
         if mass <= 0.0 || length < 1e-10 {
             continue;
         }
         let missing = least - length;
-        let approach = (squared(away(before, k)).sqrt() - length).max(0.0);
+        let approach = (squared(away(before, first, k)).sqrt() - length).max(0.0);
         let out = missing.min(approach + PUSH * hp + SHARE * missing) / (length * mass);
         for (axis, d) in d.into_iter().enumerate() {
             x[axis][a + k] += wa * out * d;

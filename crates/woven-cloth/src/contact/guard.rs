@@ -11,6 +11,7 @@
 //! the same bits.
 
 use super::distance::{Hit, Near, Point, blend, close_end, dot, first_hit};
+use super::glance::glance;
 use super::net::Net;
 use super::patches::{Pair, Patches};
 use super::tiles::Look;
@@ -27,6 +28,8 @@ const PUSH: f64 = 0.1;
 const AHEAD: f64 = 24.0;
 /// And up to this at least, m, so that what rests is left alone.
 const FAR: f64 = 40.0 * CLOSE;
+/// A glance at neighbours on the cloth is enough where what it finds lasts for so many steps like this one.
+const GLANCES: f64 = 2.0;
 /// Rounds in which things are parted one by one; after them they move as one piece.
 const ROUNDS: usize = 6;
 /// Rounds after which the cloth stays where it was.
@@ -78,8 +81,19 @@ fn look(patches: &mut Patches, before: &Field, x: &Field, parallel: bool) -> Vec
     let one = |pair: &mut Pair| {
         let mut found = Vec::new();
         let (a, b) = (&tiles[pair.a as usize], &tiles[pair.b as usize]);
+        let adjoin = a.adjoins(b);
+        if adjoin {
+            let bound = widest(
+                #[inline(always)]
+                || glance(a, b, &grids[a.grid], before),
+            );
+            if 0.85 * bound > GLANCES * pair.motion && bound > 1.1 * CLOSE {
+                pair.slack = bound.min(cap);
+                return found;
+            }
+        }
         // Neighbours on the cloth have near things to be told apart in any case.
-        let far = if a.adjoins(b) {
+        let far = if adjoin {
             cap
         } else {
             (AHEAD * pair.motion).max(FAR).min(cap)

@@ -7,6 +7,9 @@ use crate::sheet::Field;
 use crate::work::widest;
 use rayon::prelude::*;
 
+/// What the halving of a patch's columns below relies on.
+const _: () = assert!(SIDE == 4);
+
 /// How a patch moves in a step: all its vertices go by `middle`, give or take `radius`, m.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Motion {
@@ -64,20 +67,27 @@ fn of_row(g: &Grid, j: usize, before: &Field, now: &Field, out: &mut [Motion]) {
         high.fill(f64::NEG_INFINITY);
         for j in j..(j + SIDE + 1).min(g.ny) {
             let first = g.first + j * nx;
-            let (a, b) = (&before[c][first..first + nx], &now[c][first..first + nx]);
+            let (a, b) = (&before[c][first..][..nx], &now[c][first..][..nx]);
+            // Lengths that the compiler sees to be the same let it work on many columns at once.
+            let (low, high) = (&mut low[..nx], &mut high[..nx]);
             for i in 0..nx {
                 let d = b[i] - a[i];
                 low[i] = if d < low[i] { d } else { low[i] };
                 high[i] = if d > high[i] { d } else { high[i] };
             }
         }
+        // The least and the most of two neighbours, of four, and at last of the five columns of a patch.
+        for step in [1, 2] {
+            for i in 0..nx.saturating_sub(step) {
+                let (a, b) = (low[i + step], high[i + step]);
+                low[i] = if a < low[i] { a } else { low[i] };
+                high[i] = if b > high[i] { b } else { high[i] };
+            }
+        }
         for (k, m) in out.iter_mut().enumerate() {
-            let mine = k * SIDE..(k * SIDE + SIDE + 1).min(nx);
-            let least = low[mine.clone()]
-                .iter()
-                .copied()
-                .fold(f64::INFINITY, f64::min);
-            let most = high[mine].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let i = k * SIDE;
+            let last = (i + 1).min(nx - 1);
+            let (least, most) = (low[i].min(low[last]), high[i].max(high[last]));
             m.middle[c] = 0.5 * (least + most);
             m.radius += (most - least) * (most - least);
         }

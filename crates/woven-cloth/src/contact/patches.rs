@@ -1,11 +1,15 @@
 //! Which patches of the cloth are near each other: found anew when they have moved, with a lower bound of every pair's distance.
 
-use super::distance::{Point, dot};
+use super::distance::{Point, dot, sub};
 use super::motions::{self, Motion};
 use super::net::Grid;
 use super::sort_into_cells;
 use super::tiles::{Bounds, Tile};
 use crate::sheet::Field;
+
+/// Pairs are gathered anew when a patch may have moved by so many times the distance up to which they are told apart: seldom, since that is
+/// dear, and yet with few pairs that are far.
+const DRIFT: f64 = 1.1;
 
 /// Two patches and what is known of them.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +43,7 @@ pub(crate) struct Patches {
     /// Distances are told apart up to here, m.
     pub(crate) cap: f64,
     motions: Vec<Motion>,
-    /// How far a patch has moved at most since the pairs were gathered, m; none before the first time.
+    /// How far a patch has moved at most since the pairs were gathered, beside what all have moved, m; none before the first time.
     drift: Option<f64>,
 }
 
@@ -88,9 +92,20 @@ impl Patches {
         self.drift = self.drift.map(|drift| drift + most);
     }
 
-    /// The most that a patch moves in this step, m.
+    /// The most that a patch moves in this step, m, beside what all of them move.
     fn most(&self) -> f64 {
-        let of = |m: &Motion| dot(m.middle, m.middle).sqrt() + m.radius;
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for m in &self.motions {
+            for c in 0..3 {
+                low[c] = m.middle[c].min(low[c]);
+                high[c] = m.middle[c].max(high[c]);
+            }
+        }
+        let all = [0, 1, 2].map(|c| 0.5 * (low[c] + high[c]));
+        let of = |m: &Motion| {
+            let d = sub(m.middle, all);
+            dot(d, d).sqrt() + m.radius
+        };
         self.motions.iter().map(of).fold(0.0, f64::max)
     }
 
@@ -98,15 +113,15 @@ impl Patches {
     /// within this step.
     pub(crate) fn gather_if_moved(&mut self, before: &Field) {
         let most = self.most();
-        // What is not a pair is farther apart than 2.2 caps, so more than one cap before the next gathering; a tenth is left for what
-        // parting adds to a motion.
+        // What is not a pair is farther apart than one cap and twice the drift allowed, so more than one cap before the next gathering;
+        // a tenth of a cap for either is left for what parting adds to a motion.
         if self
             .drift
-            .is_some_and(|drift| drift + most < 0.5 * self.cap)
+            .is_some_and(|drift| drift + most < DRIFT * self.cap)
         {
             return;
         }
-        let reach = (2.2 * self.cap).max(1.1 * self.cap + 2.5 * most);
+        let reach = ((1.2 + 2.0 * DRIFT) * self.cap).max(1.1 * self.cap + 2.5 * most);
         self.drift = Some(0.0);
         let bounds: Vec<Bounds> = self
             .tiles

@@ -10,9 +10,9 @@ pub(super) const SIDE: usize = 4;
 /// A patch: the vertices of columns `i` and rows `j`, and the edges and triangles that lie right of and below them.
 #[derive(Clone, Debug)]
 pub(crate) struct Tile {
-    grid: usize,
-    i: std::ops::Range<usize>,
-    j: std::ops::Range<usize>,
+    pub(super) grid: usize,
+    pub(super) i: std::ops::Range<usize>,
+    pub(super) j: std::ops::Range<usize>,
 }
 
 /// A box along the axes.

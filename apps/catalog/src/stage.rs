@@ -40,7 +40,7 @@ pub struct CurtainMesh {
     pub positions: Vec<Vec3>,
     /// Unit normals, one a vertex.
     pub normals: Vec<Vec3>,
-    /// u along the weft, v along the warp, one a vertex.
+    /// u along the weft, v along the warp, in metres of cloth at rest, one a vertex.
     pub uvs: Vec<Vec2>,
     /// Three vertex numbers a triangle.
     pub indices: Vec<[u32; 3]>,
@@ -74,6 +74,8 @@ impl Stage {
             name: "curtain".to_owned(),
             material: cloth,
             moving: true,
+            // Its coordinates are metres of cloth.
+            at_rest: Some([1.0; 2]),
             ..Mesh::default()
         });
         scene.lights.extend(preset.sun());

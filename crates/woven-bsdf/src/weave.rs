@@ -28,6 +28,20 @@ pub fn openness<R: Real>(gamma_warp: R, gamma_weft: R, section: R, w: Vec3<R>) -
     warp * weft
 }
 
+/// Factor by which the openness along the normal changes when cloth whose yarns are `gammas` (warp, weft) of their pitch wide is strained:
+/// strain of the warp, of the weft (length over rest length, less 1), and shear (rad). Yarns keep their width; a pull along the
+/// weft moves the warp's yarns apart, and shear brings all of them nearer by its cosine. 1 for cloth without gaps at rest.
+#[must_use]
+pub fn opened(gammas: [f64; 2], [warp, weft, shear]: [f64; 3]) -> f64 {
+    let rest = (1.0 - gammas[0]) * (1.0 - gammas[1]);
+    if !(rest > 0.0) {
+        return 1.0;
+    }
+    let gap =
+        |gamma: f64, along: f64| (1.0 - gamma / ((1.0 + along) * shear.cos()).max(1e-3)).max(0.0);
+    gap(gammas[0], weft) * gap(gammas[1], warp) / rest
+}
+
 /// The yarn's share averaged over the cosine-weighted hemisphere: (1/π) ∫ (1 - openness) cosθ dω.
 ///
 /// Eight Gauss points in cosθ on each of four panels, narrower towards grazing where sparse or flat yarns close, times ten

@@ -69,6 +69,9 @@ pub struct Mesh {
     /// Texture coordinates, one a vertex; u runs along the weft, v along the warp. Empty: the weft runs
     /// horizontally.
     pub uvs: Vec<Vec2>,
+    /// Metres of cloth at rest in a unit of u and of v, where that is known: then stretch and shear open and close the weave of
+    /// a woven material (not that of a measured table).
+    pub at_rest: Option<[f32; 2]>,
     /// Three vertex numbers a triangle, counter-clockwise seen from the front.
     pub indices: Vec<[u32; 3]>,
     /// Number of the material.

@@ -9,6 +9,7 @@ mod material;
 mod mips;
 mod rows;
 mod sky;
+mod stretch;
 mod tree;
 
 use anyhow::{Result, bail, ensure};
@@ -109,6 +110,7 @@ impl Table {
         };
         table.fill_shade();
         table.fill_colors(scene);
+        table.fill_openings();
         table.fill_gaps();
         sky::fill(&mut table, scene, light_layers);
         lights::fill(&mut table, scene, light_layers);
@@ -147,6 +149,7 @@ impl Table {
         }
         self.bvh.refit(&self.corners);
         self.renew_shade(mesh);
+        self.open_weave(mesh);
         // Lights stay where they are when a mesh without light moves.
         if self.materials[self.meshes[mesh].material].flags & EMITS != 0 {
             lights::moved(self);
@@ -241,6 +244,38 @@ impl Table {
                 shade.colors = [a, b, c, 1];
             }
         }
+    }
+
+    /// Openness changes from place to place where cloth knows its rest.
+    fn fill_openings(&mut self) {
+        for mesh in 0..self.meshes.len() {
+            let Mesh {
+                at_rest, material, ..
+            } = self.meshes[mesh];
+            if at_rest.is_some() && self.materials[material].flags & MEASURED == 0 {
+                self.materials[material].gap = -1.0;
+                self.open_weave(mesh);
+            }
+        }
+    }
+
+    /// Renews the factors of the openness in the rows of a mesh.
+    fn open_weave(&mut self, mesh: usize) {
+        let moved = &self.meshes[mesh];
+        let material = &self.materials[moved.material];
+        if material.flags & MEASURED != 0 {
+            return;
+        }
+        let openings = stretch::openings(moved, material);
+        if openings.is_empty() {
+            return;
+        }
+        let rows = self.shade.par_iter_mut().with_min_len(1024);
+        rows.filter(|row| row.mesh as usize == mesh && row.material != NONE)
+            .for_each(|row| {
+                let corners = moved.indices[row.triangle as usize].map(|i| openings[i as usize]);
+                row.colors[3] = row.colors[3] & 1 | stretch::packed(corners);
+            });
     }
 
     fn fill_gaps(&mut self) {

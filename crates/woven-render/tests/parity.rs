@@ -422,6 +422,15 @@ fn maps_of_openness() {
     }
 }
 
+/// Pleats with as much cloth across the bottom as hangs there, so too much for the flatter top.
+#[test]
+fn a_curtain_that_is_pulled_and_sheared() {
+    let mut scene = curtain_room(lace(), 60);
+    let curtain = scene.meshes.iter_mut().find(|m| m.name == "curtain");
+    curtain.expect("a curtain").at_rest = Some([2.6, 1.85]);
+    compare("pulled curtain", &scene, &settings(8), PIXELS, MEANS);
+}
+
 /// What a sheet with a map gives back of an even light, and what passes, is what its parts do.
 #[test]
 fn a_map_of_openness_keeps_the_light() {

@@ -160,7 +160,10 @@ pub(crate) fn surface(table: &Table, hit: &Hit, wide: f32) -> Surface {
         }
         alpha = coverage(table, material, uv, area);
     }
-    if s.colors[3] != 0 {
+    if s.colors[3] > 1 {
+        alpha = opened(material, s.colors[3], hit.u, hit.v, alpha);
+    }
+    if s.colors[3] & 1 != 0 {
         let c = |k: usize| {
             let c = decode(s.colors[k], true);
             Vec3::new(c[0], c[1], c[2])
@@ -200,6 +203,21 @@ fn covered(m: &MaterialRow, alpha: f32, open: f32) -> f32 {
     gap.clamp(0.0, 1.0)
 }
 
+/// Coverage `alpha` where stretch and shear have opened the weave by the factor in `bits` (see [`crate::table::Shade::colors`]): a map of
+/// holes is multiplied; else as much less covers as the openness along the normal has grown, along which it is exact.
+#[inline(always)]
+fn opened(m: &MaterialRow, bits: u32, u: f32, v: f32, alpha: f32) -> f32 {
+    let corner = |k: u32| {
+        let root = ((bits >> (2 + 10 * k)) & 1023) as f32 * (1.0 / 512.0);
+        root * root
+    };
+    let factor = corner(0) * (1.0 - u - v) + corner(1) * u + corner(2) * v;
+    if m.flags & MULTIPLIES != 0 {
+        return (alpha * factor).min(1.0);
+    }
+    alpha * (1.0 - (factor - 1.0) * (1.0 - m.cover) / m.cover.max(1e-6)).max(0.0)
+}
+
 /// Share of the light along `d` that passes straight through the sheet.
 #[inline(always)]
 pub(crate) fn gap(table: &Table, material: &MaterialRow, s: &Surface, d: Vec3) -> f32 {
@@ -219,6 +237,10 @@ pub(crate) fn gap_at(table: &Table, place: u32, u: f32, v: f32, d: Vec3) -> f32 
         if alpha <= 0.0 {
             return covered(material, 0.0, 1.0);
         }
+    }
+    let bits = table.shade[place].colors[3];
+    if bits > 1 {
+        alpha = opened(material, bits, u, v, alpha);
     }
     let mut local = Vec3::Z;
     if material.flags & EVEN == 0 {

@@ -299,6 +299,15 @@ fn assemble(checked: Checked, base: &Path, options: &Options) -> Result<Loaded> 
     Ok(Loaded { scene, notes, hash })
 }
 
+/// `fabric_size`, metres of cloth along u and v, of a mesh's `extras.woven`; nothing where it is no size.
+fn fabric_size(extra: &Value) -> Option<[f32; 2]> {
+    let side = |k: usize| {
+        let metres = extra.get("fabric_size")?.get(k)?.as_f64()? as f32;
+        (metres.is_finite() && metres > 0.0).then_some(metres)
+    };
+    Some([side(0)?, side(1)?])
+}
+
 /// `extras.woven`, whatever it is.
 fn woven_extra(extras: Option<&serde_json::value::RawValue>) -> Option<Value> {
     let value: Value = serde_json::from_str(extras?.get()).ok()?;
@@ -350,12 +359,16 @@ impl Walk<'_> {
     fn node(&mut self, node: &gltf::Node<'_>, world: Mat4) -> Result<()> {
         if let Some(mesh) = node.mesh() {
             let portal = woven_extra(node.extras().as_deref()).is_some_and(|v| v == "portal");
+            // A curtain tells how large its cloth is at rest.
+            let cloth = woven_extra(mesh.extras().as_deref()).and_then(|v| fabric_size(&v));
+            let scale = world.determinant().abs().cbrt();
             for primitive in mesh.primitives() {
                 let name = node.name().or(mesh.name()).unwrap_or("mesh");
                 let made = self
                     .primitive(name, &primitive, world)
                     .with_context(|| format!("primitives[{}]", primitive.index()))?;
-                let Some(made) = made else { continue };
+                let Some(mut made) = made else { continue };
+                made.at_rest = cloth.map(|c| c.map(|metres| metres * scale));
                 if portal {
                     self.scene.portals.push(portal_of(&made)?);
                 } else {
@@ -476,6 +489,7 @@ impl Walk<'_> {
             indices,
             material,
             moving: false,
+            at_rest: None,
         }))
     }
 

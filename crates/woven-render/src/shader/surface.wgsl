@@ -128,7 +128,10 @@ fn surface(hit: Hit, wide: f32) -> Surface {
         }
         alpha = coverage(material, uv, area);
     }
-    if (TEXTURED && shades[place].colors.w != 0u) {
+    if (TEXTURED && shades[place].colors.w > 1u) {
+        alpha = opened(material, shades[place].colors.w, hit.u, hit.v, alpha);
+    }
+    if (TEXTURED && (shades[place].colors.w & 1u) != 0u) {
         let w = vec3<f32>(1.0 - hit.u - hit.v, hit.u, hit.v);
         var sum = vec3<f32>(0.0);
         for (var k = 0u; k < 3u; k++) {
@@ -153,6 +156,18 @@ fn covered(m: u32, alpha: f32, open: f32) -> f32 {
     return clamp(gap, 0.0, 1.0);
 }
 
+// Coverage where stretch and shear have opened the weave.
+fn opened(m: u32, bits: u32, u: f32, v: f32, alpha: f32) -> f32 {
+    let roots = vec3<f32>((vec3<u32>(bits) >> vec3<u32>(2u, 12u, 22u)) & vec3<u32>(1023u)) * (1.0 / 512.0);
+    let c = roots * roots;
+    let factor = c.x * (1.0 - u - v) + c.y * u + c.z * v;
+    if ((materials[m].flags & MULTIPLIES) != 0u) {
+        return min(alpha * factor, 1.0);
+    }
+    let cover = materials[m].cover;
+    return alpha * max(1.0 - (factor - 1.0) * (1.0 - cover) / max(cover, 1e-6), 0.0);
+}
+
 fn gap_of(m: u32, s: Surface, d: vec3<f32>) -> f32 {
     if (!(TEXTURED || MEASURES || LOBES) || materials[m].gap >= 0.0) {
         return materials[m].gap;
@@ -168,6 +183,9 @@ fn gap_at(place: u32, u: f32, v: f32, d: vec3<f32>) -> f32 {
         if (alpha <= 0.0) {
             return covered(m, 0.0, 1.0);
         }
+    }
+    if (TEXTURED && shades[place].colors.w > 1u) {
+        alpha = opened(m, shades[place].colors.w, u, v, alpha);
     }
     var w = vec3<f32>(0.0, 0.0, 1.0);
     if ((materials[m].flags & EVEN) == 0u) {

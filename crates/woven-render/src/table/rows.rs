@@ -21,7 +21,8 @@ pub struct Shade {
     pub weft: [f32; 4],
     /// v of the three corners, then the area of the triangle in (u, v) over its area in metres.
     pub v: [f32; 4],
-    /// Colours of the corners, sRGB of 8 bits, red lowest; then 1 where there are any.
+    /// Colours of the corners, sRGB of 8 bits, red lowest; then 1 where there are any, and from the third bit on, ten for each
+    /// corner, 512 times the root of the factor of the openness (0: none).
     pub colors: [u32; 4],
     /// Row of the material.
     pub material: u32,

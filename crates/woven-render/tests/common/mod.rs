@@ -16,6 +16,7 @@ pub(crate) fn quad(name: &str, corner: Vec3, u: Vec3, v: Vec3, material: usize) 
         indices: vec![[0, 1, 2], [0, 2, 3]],
         material,
         moving: false,
+        at_rest: None,
     }
 }
 

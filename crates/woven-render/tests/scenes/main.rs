@@ -7,3 +7,4 @@ mod common;
 mod events;
 mod gloss;
 mod lights;
+mod stretch;

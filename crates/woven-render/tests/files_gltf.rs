@@ -34,6 +34,20 @@ fn meshes_are_where_their_nodes_put_them() {
 }
 
 #[test]
+fn cloth_tells_its_size_at_rest() {
+    let (mut doc, bin) = scene();
+    assert_eq!(read(&doc, &bin).scene.meshes[0].at_rest, None);
+    doc["meshes"][0]["extras"] = json!({ "woven": { "fabric_size": [1.5, 2.5] } });
+    doc["nodes"][1]["scale"] = json!([2.0, 2.0, 2.0]);
+    let [u, v] = read(&doc, &bin).scene.meshes[0].at_rest.unwrap();
+    assert!((u - 3.0).abs() < 1e-5 && (v - 5.0).abs() < 1e-5, "{u} {v}");
+    for nonsense in [json!([1.5]), json!([0.0, 1.0]), json!(["a", 1.0]), json!(7)] {
+        doc["meshes"][0]["extras"]["woven"]["fabric_size"] = nonsense;
+        assert_eq!(read(&doc, &bin).scene.meshes[0].at_rest, None);
+    }
+}
+
+#[test]
 fn a_mirroring_node_keeps_the_front_in_front() {
     let (mut doc, bin) = scene();
     doc["nodes"][1]["scale"] = json!([-2.0, 1.0, 1.0]);

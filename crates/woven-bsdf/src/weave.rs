@@ -34,7 +34,7 @@ pub fn openness<R: Real>(gamma_warp: R, gamma_weft: R, section: R, w: Vec3<R>) -
 #[must_use]
 pub fn opened(gammas: [f64; 2], [warp, weft, shear]: [f64; 3]) -> f64 {
     let rest = (1.0 - gammas[0]) * (1.0 - gammas[1]);
-    if !(rest > 0.0) {
+    if rest <= 0.0 || !rest.is_finite() {
         return 1.0;
     }
     let gap =

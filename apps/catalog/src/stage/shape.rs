@@ -30,6 +30,7 @@ impl Shape {
             indices,
             material,
             moving: false,
+            at_rest: None,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Cloth that is pulled lets more light through its weave and scatters as much less; at rest nothing changes.
 //!
-//! Seen to fail: without the factor in `gap_at` of either backend, in `surface`, or in [`Renderer::move_mesh`].
+//! Seen to fail: without the factor in the shader's `gap_at`, in its `surface`, or after [`Renderer::move_mesh`].
 
 use std::sync::atomic::AtomicBool;
 

@@ -149,7 +149,9 @@ impl Table {
         }
         self.bvh.refit(&self.corners);
         self.renew_shade(mesh);
-        self.open_weave(mesh);
+        if let Some(rest) = self.rest(mesh) {
+            self.open_weave(mesh, rest);
+        }
         // Lights stay where they are when a mesh without light moves.
         if self.materials[self.meshes[mesh].material].flags & EMITS != 0 {
             lights::moved(self);
@@ -249,27 +251,25 @@ impl Table {
     /// Openness changes from place to place where cloth knows its rest.
     fn fill_openings(&mut self) {
         for mesh in 0..self.meshes.len() {
-            let Mesh {
-                at_rest, material, ..
-            } = self.meshes[mesh];
-            if at_rest.is_some() && self.materials[material].flags & MEASURED == 0 {
-                self.materials[material].gap = -1.0;
-                self.open_weave(mesh);
+            if let Some(rest) = self.rest(mesh) {
+                self.materials[self.meshes[mesh].material].gap = -1.0;
+                self.open_weave(mesh, rest);
             }
         }
     }
 
+    /// [`Mesh::at_rest`] where the weave opens when the cloth is pulled; a measured table's does not.
+    fn rest(&self, mesh: usize) -> Option<[f32; 2]> {
+        let Mesh {
+            at_rest, material, ..
+        } = self.meshes[mesh];
+        at_rest.filter(|_| self.materials[material].flags & MEASURED == 0)
+    }
+
     /// Renews the factors of the openness in the rows of a mesh.
-    fn open_weave(&mut self, mesh: usize) {
+    fn open_weave(&mut self, mesh: usize, rest: [f32; 2]) {
         let moved = &self.meshes[mesh];
-        let material = &self.materials[moved.material];
-        if material.flags & MEASURED != 0 {
-            return;
-        }
-        let openings = stretch::openings(moved, material);
-        if openings.is_empty() {
-            return;
-        }
+        let openings = stretch::openings(moved, rest, &self.materials[moved.material]);
         let rows = self.shade.par_iter_mut().with_min_len(1024);
         rows.filter(|row| row.mesh as usize == mesh && row.material != NONE)
             .for_each(|row| {

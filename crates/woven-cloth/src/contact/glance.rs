@@ -6,9 +6,9 @@
 //! that are d apart on the flat cloth are (s - e) d apart in space, s the lesser singular value of A, since the straight way between
 //! them lies within the cells. What bends too much for that is left to [`Tile::look`].
 
-use super::distance::{Point, dot, sub};
+use super::distance::{Point, dot};
 use super::net::Grid;
-use super::tiles::{SIDE, Tile};
+use super::tiles::{Bounds, SIDE, Tile};
 use crate::sheet::Field;
 
 /// Cells of a patch.
@@ -60,7 +60,7 @@ fn corners(
 #[inline(always)]
 fn stiffness(g: &Grid, x: &Field, [i, j]: [usize; 2]) -> f64 {
     let k = g.first + j * g.nx + i;
-    let (mut weft, mut warp) = (Spread::NONE, Spread::NONE);
+    let (mut weft, mut warp) = (Bounds::EMPTY, Bounds::EMPTY);
     for c in 0..3 {
         let row = |j: usize| -> Point {
             let k = k + j * g.nx;
@@ -68,48 +68,20 @@ fn stiffness(g: &Grid, x: &Field, [i, j]: [usize; 2]) -> f64 {
         };
         let p = [row(0), row(1), row(2)];
         for n in 0..3 {
-            weft.add(c, p[n][1] - p[n][0]);
-            weft.add(c, p[n][2] - p[n][1]);
-            warp.add(c, p[1][n] - p[0][n]);
-            warp.add(c, p[2][n] - p[1][n]);
+            weft.widen(c, p[n][1] - p[n][0]);
+            weft.widen(c, p[n][2] - p[n][1]);
+            warp.widen(c, p[1][n] - p[0][n]);
+            warp.widen(c, p[2][n] - p[1][n]);
         }
     }
-    let (a, b) = (weft.middle(1.0 / g.hx), warp.middle(1.0 / g.hy));
+    let (a, b) = (
+        weft.middle().map(|d| d * (1.0 / g.hx)),
+        warp.middle().map(|d| d * (1.0 / g.hy)),
+    );
     let apart2 = weft.radius2() / (g.hx * g.hx) + warp.radius2() / (g.hy * g.hy);
     let (p, q, r) = (dot(a, a), dot(a, b), dot(b, b));
     let s2 = 0.5 * (p + r) - (0.25 * (p - r) * (p - r) + q * q).sqrt();
     s2.max(0.0).sqrt() - apart2.sqrt()
-}
-
-/// The box of some vectors.
-struct Spread {
-    low: Point,
-    high: Point,
-}
-
-impl Spread {
-    const NONE: Self = Self {
-        low: [f64::INFINITY; 3],
-        high: [f64::NEG_INFINITY; 3],
-    };
-
-    #[inline(always)]
-    fn add(&mut self, c: usize, d: f64) {
-        self.low[c] = if d < self.low[c] { d } else { self.low[c] };
-        self.high[c] = if d > self.high[c] { d } else { self.high[c] };
-    }
-
-    #[inline(always)]
-    fn middle(&self, times: f64) -> Point {
-        std::array::from_fn(|c| 0.5 * (self.low[c] + self.high[c]) * times)
-    }
-
-    /// Square of half the diagonal.
-    #[inline(always)]
-    fn radius2(&self) -> f64 {
-        let d = sub(self.high, self.low);
-        0.25 * dot(d, d)
-    }
 }
 
 /// The bound for cells that do not touch on the cloth.

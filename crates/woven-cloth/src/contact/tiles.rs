@@ -23,7 +23,7 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    const EMPTY: Self = Self {
+    pub(super) const EMPTY: Self = Self {
         low: [f64::INFINITY; 3],
         high: [f64::NEG_INFINITY; 3],
     };
@@ -31,9 +31,15 @@ impl Bounds {
     #[inline(always)]
     fn add(&mut self, x: &Field, k: usize) {
         for c in 0..3 {
-            self.low[c] = self.low[c].min(x[c][k]);
-            self.high[c] = self.high[c].max(x[c][k]);
+            self.widen(c, x[c][k]);
         }
+    }
+
+    /// Takes in a point's coordinate `d` along axis `c`.
+    #[inline(always)]
+    pub(super) fn widen(&mut self, c: usize, d: f64) {
+        self.low[c] = if d < self.low[c] { d } else { self.low[c] };
+        self.high[c] = if d > self.high[c] { d } else { self.high[c] };
     }
 
     #[inline(always)]
@@ -48,14 +54,21 @@ impl Bounds {
             .sum()
     }
 
+    #[inline(always)]
     pub(crate) fn middle(&self) -> Point {
         std::array::from_fn(|c| 0.5 * (self.low[c] + self.high[c]))
     }
 
+    /// Its square, m².
+    #[inline(always)]
+    pub(super) fn radius2(&self) -> f64 {
+        let d = sub(self.high, self.low);
+        0.25 * dot(d, d)
+    }
+
     /// Half the diagonal, m.
     pub(crate) fn radius(&self) -> f64 {
-        let d = sub(self.high, self.low);
-        0.5 * dot(d, d).sqrt()
+        self.radius2().sqrt()
     }
 }
 

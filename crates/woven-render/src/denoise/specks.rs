@@ -98,12 +98,11 @@ pub(super) fn mend(
         let before = std::mem::take(change);
         *change = (0..like.len())
             .map(|i| {
-                let to = filtered(source, &before, like[i]);
                 if like[i] == i {
-                    before[i]
-                } else {
-                    [0, 1, 2].map(|k| to[k] - source[i][k])
+                    return before[i];
                 }
+                let to = filtered(source, &before, like[i]);
+                [0, 1, 2].map(|k| to[k] - source[i][k])
             })
             .collect();
     }

@@ -51,12 +51,9 @@ pub(super) fn strains(mesh: &Mesh, rest: [f32; 2]) -> Vec<[f32; 3]> {
         .collect()
 }
 
-/// Factor of the openness at every vertex of a mesh with this material, as the rows hold it (see [`packed`]); nothing for a
-/// mesh that does not know its rest.
-pub(super) fn openings(mesh: &Mesh, material: &MaterialRow) -> Vec<u32> {
-    let Some(rest) = mesh.at_rest else {
-        return Vec::new();
-    };
+/// Factor of the openness at every vertex of a mesh with this material, as the rows hold it (see [`packed`]); `rest` as for
+/// [`strains`].
+pub(super) fn openings(mesh: &Mesh, rest: [f32; 2], material: &MaterialRow) -> Vec<u32> {
     let shape = &material.shape;
     let gammas = [f64::from(shape[0]), f64::from(shape[1])];
     let open = 1.0 - f64::from(material.cover);
